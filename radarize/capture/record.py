@@ -74,8 +74,7 @@ def recording(stream: FrameStream, output: Path, overwrite: bool = False) -> Ite
     Raises:
         InputError: it cannot be written; or of whatever went wrong, with the frames that are kept.
     """
-    about = {"cfg_text": stream.text, "attributes": stream.facts}
-    writer = RecordingWriter(output, stream.config, **about, overwrite=overwrite)
+    writer = RecordingWriter(output, stream.config, cfg_text=stream.text, attributes=stream.facts, overwrite=overwrite)
     keeper = Keeper(writer)
     ended: BaseException | None = None
     try:

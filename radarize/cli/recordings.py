@@ -81,7 +81,7 @@ def import_(
     ramp_end_time: Annotated[float | None, typer.Option(help="s.")] = None,
     frame_period: Annotated[float | None, typer.Option(help="s.")] = None,
     start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
-):
+) -> None:
     """Make a recording from a capture of a real radar."""
     given = dict(locals())  # all options, by name
     from radarize.io.load import load
@@ -104,7 +104,7 @@ def capture(
     duration: Duration = None,
     frames: FrameCount = None,
     overwrite: Overwrite = False,
-):
+) -> None:
     """Record a real radar: IWR1843BOOST with a DCA1000. Whatever ends it, Ctrl-C too, leaves a whole file."""
     from radarize.capture.api import frames_within, sensor
     from radarize.capture.record import record
@@ -147,7 +147,7 @@ def live(
         str | None, typer.Option(metavar="HOST:PORT", help="Serve Foxglove as well, e.g. 127.0.0.1:8765.")
     ] = None,
     overwrite: Overwrite = False,
-):
+) -> None:
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
     given = dict(locals())  # all options, by name
     from radarize.capture.api import live
@@ -170,7 +170,7 @@ def live(
 def recover(
     part: Annotated[Path, typer.Argument(metavar="REC.h5.part", help="What a program that was killed has left.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Recording to write; else REC.h5.")] = None,
-):
+) -> None:
     """Make a recording of what is left of one: all whole frames, up to a second before its program was killed."""
     from radarize.io.recording import recover
 
@@ -178,7 +178,7 @@ def recover(
 
 
 @app.command()
-def info(recording: RecordingFile, as_json: AsJson = False):
+def info(recording: RecordingFile, as_json: AsJson = False) -> None:
     """Say what a recording holds."""
     from radarize.evaluation.report.contents import contents, show
 

@@ -32,7 +32,7 @@ def run_(
     ] = None,
     config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
     every: Annotated[int, typer.Option(min=1, help="Use every N-th frame.")] = 1,
-):
+) -> None:
     """Estimate trajectory and map of a recording."""
     from radarize.io.load import load
     from radarize.pipeline.odometry import configuration
@@ -53,7 +53,7 @@ def run_(
 
 
 @app.command("config")
-def config_():
+def config_() -> None:
     """Print all settings of the pipeline as YAML, with what they mean: `radarize config > mine.yaml`."""
     from radarize.pipeline.config import Configuration
 
@@ -70,7 +70,7 @@ def slam(
     preset: Annotated[str | None, typer.Option(help="radar (of a RUN), lidar (of a file) or cartographer.")] = None,
     config: Annotated[Path | None, typer.Option(help="Settings that differ from the preset (.yaml).")] = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM), for `radarize evaluate`.")] = None,
-):
+) -> None:
     """Estimate trajectory and map from scans and odometry of any sensor.
 
     SCANS holds ranges (scan, beam), angle_min, angle_increment, range_max and, unless one a second, times.
@@ -93,7 +93,7 @@ def evaluate(
     beside: Beside = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
     as_json: AsJson = False,
-):
+) -> None:
     """Compare a run with the truth; writes metrics.json."""
     from radarize.evaluation.evaluation import evaluate
     from radarize.evaluation.report.words import beside as compared
@@ -119,7 +119,7 @@ def export(
         str, typer.Option(help="bin (DCA1000 and .cfg), ros2 (a bag), tum (poses) or map (for map_server).")
     ],
     run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,
-):
+) -> None:
     """Write a recording or a run for other programs."""
     from radarize.io.exporters import export
 
@@ -133,7 +133,7 @@ def report(
     source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="A run's folder, or a recording.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
     beside: Beside = None,
-):
+) -> None:
     """Draw a run or a recording as one HTML page."""
     from radarize.evaluation.report.recording import report_recording
     from radarize.evaluation.report.run import report_run
@@ -150,7 +150,7 @@ def view(
     save: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write .rrd, or .mcap for Foxglove, instead of a window.")
     ] = None,
-):
+) -> None:
     """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
     with progress("view") as report:
         if save is not None and save.suffix == ".mcap":

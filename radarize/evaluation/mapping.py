@@ -102,7 +102,7 @@ def agreement(
         ``precision`` and ``recall``, the shares of cells and points that do, and ``f1``, their harmonic mean.
     """
     precision = over(off_surface <= near)
-    recall = np.mean(off_map <= near)
+    recall = float(np.mean(off_map <= near))
     return {"precision": precision, "recall": recall, "f1": 2 * precision * recall / max(precision + recall, 1e-12)}
 
 

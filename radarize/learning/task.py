@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Generic, TypeVar, cast
 
 import torch
 from jaxtyping import Float, Int
@@ -16,8 +17,8 @@ from radarize.learning.nets.gaussian import Gaussian
 from radarize.learning.nets.weights import Header, Network, build
 from radarize.signal.maps import Maps
 
-#: What a network reads, one tensor or several.
-Inputs = Tensor | tuple[Tensor, ...]
+#: What a network reads of items: one tensor, or several.
+Inputs = TypeVar("Inputs", Tensor, tuple[Tensor, ...])
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Settings:
     seed: int = 0
 
 
-class Task(ABC):
+class Task(ABC, Generic[Inputs]):
     """What the trainer needs to know of a network's task.
 
     Attributes:
@@ -74,7 +75,7 @@ class Task(ABC):
     share: float = 1.0
     reach: float | None = None
     least_frames: int = 1
-    optimiser: type[torch.optim.Optimizer] = torch.optim.Adam
+    optimiser: Callable[..., torch.optim.Optimizer] = torch.optim.Adam
     steepest: float = 1.0
     defaults: Settings
 
@@ -83,14 +84,14 @@ class Task(ABC):
         """All that its network reads of a frame."""
         return (*self.maps, *(reading.name for reading in self.sensed))
 
-    def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
+    def header(self, settings: Settings, grid: Grid | None, **about: Any) -> Header:
         """What its weights' file says; see `Header` for what else to say."""
         return Header(
             kind=self.network.kind, setting=self.network.setting, frames=settings.frames, maps=self.reads,
             width=settings.width, grid=grid, seed=settings.seed, **about,
         )  # fmt: skip
 
-    def net(self, settings: Settings, grid: Grid | None) -> nn.Module:
+    def net(self, settings: Settings, grid: Grid | None) -> Network:
         """A network for maps of a grid, if it reads any, with random weights from torch's generator."""
         return build(self.network, self.header(settings, grid))
 
@@ -120,7 +121,7 @@ class Task(ABC):
 
     def inputs(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Inputs:
         """What the network reads of windows."""
-        return table.window(frames)
+        return cast(Inputs, table.window(frames))  # tasks that read several tensors have their own
 
     def label(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Tensor:
         """What the network should say of windows."""
@@ -134,15 +135,15 @@ class Task(ABC):
         return self.inputs(table, frames), self.label(table, frames)
 
     @abstractmethod
-    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+    def augment(self, maps: Inputs, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:
         """Items as they might as well have been."""
 
     @abstractmethod
-    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
+    def loss(self, net: nn.Module, maps: Inputs, label: Tensor) -> Float[Tensor, "item"]:
         """What training makes small; calls the network once."""
 
     @abstractmethod
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+    def judge(self, net: Network, maps: Inputs, label: Tensor) -> Float[Tensor, "item number"]:
         """Of what `estimate` says of each item: the validation loss, then what `metrics` needs."""
 
     @abstractmethod
@@ -150,11 +151,11 @@ class Task(ABC):
         """Names and values, from the means of what `judge` says."""
 
     @abstractmethod
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Inputs, Tensor]]) -> None:
         """Make a trained network's uncertainty honest on validation data, which is gone through once."""
 
 
-class Motion(Task):
+class Motion(Task[Tensor]):
     """Velocity or turn.
 
     Attributes:
@@ -164,7 +165,7 @@ class Motion(Task):
     error: str
     size: str
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
         return self._judged(*net.estimate(maps), label)
 
     def _judged(self, mean: Tensor, covariance: Tensor, label: Tensor) -> Tensor:
@@ -183,10 +184,11 @@ class Motion(Task):
             "normalised_error_squared": normalised,
         }
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        net.spread.zero_()
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+        spread = net.get_buffer("spread")
+        spread.zero_()
         normalised = torch.cat([self.judge(net, *batch)[:, 3] for batch in batches])
-        net.spread.fill_(0.5 * normalised.mean().log())
+        spread.fill_(0.5 * normalised.mean().log())
 
 
 def turns(table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:

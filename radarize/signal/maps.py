@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
+from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16, Real
 from torch import Tensor
 
 from radarize.io.errors import InputError
@@ -133,7 +133,13 @@ class MapMaker(Maker):
         axes = self.axes(self.heatmaps.config, name)
         return axes.rows, len(axes.azimuths)
 
-    def __call__(self, adc, valid=None, names=None, frames=slice(None)):
+    def __call__(
+        self,
+        adc: Real[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        names: tuple[str, ...] | None = None,
+        frames: slice | Int[np.ndarray, "map"] = slice(None),
+    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
         return self.of(self.heatmaps.spectrum(adc[frames], None if valid is None else valid[frames]), names)
 
     def of(
@@ -143,7 +149,8 @@ class MapMaker(Maker):
         heatmaps, names = self.heatmaps, names or self.names
         paired = heatmaps.pairs is not None
         with stage("maps"):
-            limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
+            # Only maps of Doppler look at it.
+            limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else spectrum
             makers = {
                 "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
                 "elevation_aware": lambda: (

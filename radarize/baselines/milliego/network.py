@@ -55,6 +55,8 @@ class MilliEgoNet(Network):
     """
 
     kind, inputs = "milliego", ("panorama", "imu")
+    scale: Float[Tensor, "6"]
+    error: Float[Tensor, "3"]
 
     def __init__(self, frames: int, maps: Sequence[str] = ("panorama", "imu"), width: int = 64):
         super().__init__(frames, maps, width)

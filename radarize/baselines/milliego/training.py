@@ -12,7 +12,8 @@ from radarize.baselines.milliego.network import DEGREES, PAIR, SAMPLES, MilliEgo
 from radarize.baselines.milliego.panorama import seen
 from radarize.io.recording import Recording
 from radarize.learning.features.table import POSE, FeatureTable, Reading
-from radarize.learning.task import Inputs, Settings, Task
+from radarize.learning.nets.weights import Network
+from radarize.learning.task import Settings, Task
 from radarize.odometry.inertial import Imu, instants
 
 
@@ -20,7 +21,7 @@ def _latest(recording: Recording, frames: slice) -> Float[np.ndarray, "frame sam
     return Imu.of(recording).latest(instants(recording)[frames], SAMPLES).astype(np.float16)
 
 
-class MilliEgo(Task):
+class MilliEgo(Task[tuple[Tensor, ...]]):
     """Motions between panoramas 0.2 s apart: translation (m) in the older one's axes, and Euler angles (deg)."""
 
     network, truth = MilliEgoNet, (POSE,)
@@ -35,7 +36,7 @@ class MilliEgo(Task):
     def spacings(self, frame_period: float) -> Sequence[int]:
         return (max(1, round(PAIR / frame_period)),)
 
-    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Inputs:
+    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> tuple[Tensor, ...]:
         return tuple(table.sensed[name][frames].float() for name in self.reads)
 
     def label(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item pair 6"]:
@@ -46,7 +47,9 @@ class MilliEgo(Task):
         turn = Rotation.from_matrix((back @ turned[:, 1:]).reshape(-1, 3, 3)).as_euler("xyz", degrees=True)
         return torch.from_numpy(np.concatenate([step, turn.reshape(step.shape)], axis=-1)).float()
 
-    def augment(self, inputs: Inputs, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:
+    def augment(
+        self, inputs: tuple[Tensor, ...], label: Tensor, generator: Generator
+    ) -> tuple[tuple[Tensor, ...], Tensor]:
         """Half of the items are mirrored, left for right; the original has enough walks to do without."""
         panorama, imu = inputs
         left = torch.rand((len(label), 1, 1, 1), generator=generator, device=label.device) < 0.5
@@ -54,10 +57,11 @@ class MilliEgo(Task):
         imu = torch.where(left, imu * imu.new_tensor([1, -1, 1, -1, 1, -1]), imu)
         return (panorama, imu), torch.where(left[:, 0], label * label.new_tensor([1, -1, 1, -1, 1, -1]), label)
 
-    def loss(self, net: nn.Module, inputs: Inputs, label: Tensor) -> Float[Tensor, "item"]:
+    def loss(self, net: nn.Module, inputs: tuple[Tensor, ...], label: Tensor) -> Float[Tensor, "item"]:
         return _milliego_loss(net(*inputs), label)
 
-    def judge(self, net: nn.Module, inputs: Inputs, label: Tensor) -> Tensor:
+    def judge(self, net: Network, inputs: tuple[Tensor, ...], label: Tensor) -> Tensor:
+        assert isinstance(net, MilliEgoNet)
         motion = net(*inputs)
         error, size = net.planar(motion[:, -1])[0] - _planar(label), _planar(label)
         numbers = [part.square().sum(dim=1) for each in (error, size) for part in each.split([2, 1], dim=1)]
@@ -68,10 +72,10 @@ class MilliEgo(Task):
         names = ("rmse_m", "rmse_rad", "rms_step_m", "rms_turn_rad")
         return {"loss": loss} | {name: value**0.5 for name, value in zip(names, squares, strict=True)}
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Inputs, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[tuple[Tensor, ...], Tensor]]) -> None:
         """Keep the validation error as everyone's."""
         errors = [net.estimate(*inputs)[0] - _planar(label) for inputs, label in batches]
-        net.error.copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-6))
+        net.get_buffer("error").copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-6))
 
 
 def _planar(label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item 3"]:

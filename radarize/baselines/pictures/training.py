@@ -15,6 +15,7 @@ from radarize.baselines.pictures.task import PictureTask
 from radarize.baselines.walks.clouds import Apart
 from radarize.learning.features.augment import chosen, mirrored
 from radarize.learning.features.table import Reading
+from radarize.learning.nets.weights import Network
 from radarize.learning.task import Settings
 from radarize.signal import polar
 from radarize.signal.maps import Maps
@@ -48,21 +49,24 @@ class Pictures(PictureTask):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return entropy(net(maps), label)
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         logits, label = net(validated(maps)), unpacked(label)
-        return torch.stack([entropy(logits, label), chamfer(points(logits.exp(), net.dense), label)], dim=1)
+        return torch.stack(
+            [entropy(logits, label), chamfer(points(logits.exp(), net.get_buffer("dense")), label)], dim=1
+        )
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
         loss, chamfer = means.tolist()
         return {"loss": loss, "chamfer_m": chamfer}
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Choose the probability from which on every cell has a point: the least mean Chamfer distance."""
-        total = torch.zeros(len(DENSE), device=net.dense.device)
+        least = net.get_buffer("dense")
+        total = torch.zeros(len(DENSE), device=least.device)
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label)
             total += torch.stack([chamfer(points(probability, dense), label).sum() for dense in DENSE])
-        net.dense.fill_(DENSE[int(total.argmin())])
+        least.fill_(DENSE[int(total.argmin())])
 
 
 def chamfer(found: Bool[Tensor, "item row column"], label: Float[Tensor, "item row other"]) -> Float[Tensor, "item"]:

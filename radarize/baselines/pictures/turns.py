@@ -39,6 +39,7 @@ class PictureTurnNet(Network):
 
     kind, outputs = "picture-turns", ("turn", "covariance")
     maker = PictureMaker
+    spread: Float[Tensor, ""]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 8):
         super().__init__(frames, maps, width)
@@ -80,7 +81,7 @@ class PictureTurns(PictureTask, Motion):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return losses.likelihood(net(maps), label)
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         return super().judge(net, self._pictures(maps, Generator(maps.device).manual_seed(0)), label)
 
     @staticmethod

@@ -138,7 +138,8 @@ class PublishedMaps(Maker):
             silence = covariance.new_zeros(self.history, *covariance.shape[1:])
             buffer = torch.cat([silence, covariance])
             for name, count in zip(names, BUFFERS, strict=True):
-                mean = sum(buffer[wanted + self.history - k] for k in range(count)) / count
+                shifted = (buffer[wanted + self.history - k] for k in range(count))
+                mean = sum(shifted, start=buffer.new_zeros(())) / count
                 made[name] = levels(capon(mean, beams), RANGE_LEVELS).float()
         return made
 

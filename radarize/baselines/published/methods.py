@@ -2,7 +2,6 @@
 
 import numpy as np
 from jaxtyping import Float
-from torch import nn
 
 from radarize.baselines.published.maps import PublishedMaps, PublishedStream
 from radarize.baselines.published.networks import (
@@ -20,8 +19,10 @@ from radarize.pipeline.method import Inputs, Method
 
 def odometry(inputs: Inputs) -> PublishedOdometry:
     """Like the artefact, from true headings where the recording has them."""
-    nets = (_load(inputs, network) for network in (PublishedTranslationNet, PublishedRotationNet))
-    return PublishedOdometry(PublishedStream(inputs.radar), *nets, _headings(inputs))
+    return PublishedOdometry(
+        PublishedStream(inputs.radar), _load(inputs, PublishedTranslationNet), _load(inputs, PublishedRotationNet),
+        _headings(inputs),
+    )  # fmt: skip
 
 
 def scans(inputs: Inputs) -> PublishedScans:
@@ -29,7 +30,7 @@ def scans(inputs: Inputs) -> PublishedScans:
     return PublishedScans(PublishedStream(inputs.radar), _load(inputs, PublishedSegmentationNet))
 
 
-def _load(inputs: Inputs, network: type[Network]) -> nn.Module:
+def _load(inputs: Inputs, network: type[Network]) -> Network:
     if inputs.weights.folder is None:
         raise InputError(
             "published odometry and scans come without weights: train them (`radarize train published-translation` and "

@@ -44,6 +44,7 @@ class PublishedMotionNet(Network):
     setting, maker = "published", PublishedMaps
     dimensions: int
     pool: bool
+    error: Float[Tensor, "dimension"]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__(frames, maps, width)
@@ -73,7 +74,9 @@ class PublishedRotationNet(PublishedMotionNet):
         super().__init__(frames, maps, width)
         for module in self.resnet.modules():
             if isinstance(module, Block):
-                module.body.append(Attention(module.body[-1].num_features))
+                last = module.body[-1]
+                assert isinstance(last, nn.BatchNorm2d)  # of a block over images
+                module.body.append(Attention(last.num_features))
         layers = (8 * width, 32, 256, 1)
         pairs = [(nn.Linear(a, b), nn.ReLU()) for a, b in zip(layers[:-1], layers[1:], strict=True)]
         self.resnet.head = nn.Sequential(*[layer for pair in pairs for layer in pair][:-1])

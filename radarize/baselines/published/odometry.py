@@ -7,6 +7,7 @@ from jaxtyping import Float, Float16
 from radarize.baselines.published.maps import PublishedStream
 from radarize.io.pose import between, wrap
 from radarize.io.stopwatch import stage
+from radarize.learning.nets.weights import Network
 from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
 from radarize.signal.batch import Batch
@@ -31,8 +32,8 @@ class PublishedOdometry:
     def __init__(
         self,
         stream: PublishedStream,
-        translation: torch.nn.Module,
-        rotation: torch.nn.Module,
+        translation: Network,
+        rotation: Network,
         headings: Float[np.ndarray, "4"] | None = None,
     ):
         self._stream, self._translation, self._rotation = stream, translation, rotation
@@ -55,9 +56,17 @@ class PublishedOdometry:
             turn, turn_noise = self._rotation.estimate(pairs) if len(pairs) else (torch.zeros(0, 1),) * 2
         return self._integrate(batch.centers[used], velocity, velocity_noise, turn, turn_noise, seen[-len(used) :])
 
-    def _integrate(self, times, velocity, velocity_noise, turn, turn_noise, maps) -> Track:
+    def _integrate(
+        self,
+        times: Float[np.ndarray, "used"],
+        velocities: Float[torch.Tensor, "used 2"],
+        velocity_noise: Float[torch.Tensor, "used 2 2"],
+        turns: Float[torch.Tensor, "told 1"],
+        turn_noise: Float[torch.Tensor, "told ..."],
+        maps: Float[torch.Tensor, "used map row azimuth"],
+    ) -> Track:
         """Poses from velocities since the frame before and turns since four frames before."""
-        velocity, turn = velocity.double().numpy(), turn[:, 0].double().numpy()
+        velocity, turn = velocities.double().numpy(), turns[:, 0].double().numpy()
         poses, steps, spreads = np.zeros((len(times), 3)), np.zeros((len(times), 3)), np.zeros((len(times), 3, 3))
         late = len(times) - len(turn)  # frames of this batch that have none four before them
         for i, time in enumerate(times):
@@ -76,12 +85,21 @@ class PublishedOdometry:
         return _track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy())
 
 
-def window(net: torch.nn.Module, made: dict[str, Float16[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
+def window(net: Network, made: dict[str, Float16[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
     """What a network reads of frames: (frame, map, row, azimuth)."""
     return torch.stack([torch.from_numpy(made[name]).float() for name in net.maps], dim=1)
 
 
-def _track(times, poses, steps, spreads, velocity, velocity_spread) -> Track:
+def _track(
+    times: Float[np.ndarray, "used"],
+    poses: Float[np.ndarray, "used 3"],
+    steps: Float[np.ndarray, "used 3"],
+    spreads: Float[np.ndarray, "used 3 3"],
+    velocity: Float[np.ndarray, "used 2"],
+    velocity_spread: Float[np.ndarray, "used 2 2"],
+) -> Track:
     """The artefact always takes velocity and turn for seen, and steps for independent."""
-    seen = np.ones((2, len(times)), bool)
-    return Track(times, poses, steps, spreads, velocity, velocity_spread, *seen, Claims.independent(spreads))
+    velocity_seen, turn_seen = np.ones((2, len(times)), bool)
+    return Track(
+        times, poses, steps, spreads, velocity, velocity_spread, velocity_seen, turn_seen, Claims.independent(spreads)
+    )

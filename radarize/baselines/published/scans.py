@@ -8,6 +8,7 @@ from radarize.baselines.published import labels
 from radarize.baselines.published.maps import PublishedStream
 from radarize.baselines.published.odometry import window
 from radarize.io.stopwatch import stage
+from radarize.learning.nets.weights import Network
 from radarize.signal.batch import Batch
 from radarize.signal.bearings import BEARINGS
 
@@ -18,7 +19,7 @@ _COLUMNS = np.abs(BEARINGS[:, None] - labels.BEARINGS).argmin(axis=1)
 class PublishedScans:
     """Scans of those frames that the artefact uses; the others see nothing."""
 
-    def __init__(self, stream: PublishedStream, segmentation: torch.nn.Module):
+    def __init__(self, stream: PublishedStream, segmentation: Network):
         self._stream, self._net = stream, segmentation
 
     @torch.inference_mode()

@@ -51,6 +51,7 @@ class DrawingNet(Network):
     """
 
     outputs = ("probability",)
+    least: Float[Tensor, ""]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__(frames, maps, width)
@@ -92,6 +93,7 @@ class RadarHdNet(DrawingNet):
     """
 
     kind = "radarhd"
+    resampling: Float[Tensor, "azimuth column"]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__(frames, maps, width)

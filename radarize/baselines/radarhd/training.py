@@ -13,6 +13,7 @@ from radarize.io.recording import Recording
 from radarize.learning.features import augment
 from radarize.learning.features.grid import Grid
 from radarize.learning.features.table import Reading
+from radarize.learning.nets.weights import Network
 from radarize.learning.task import Settings, Task, first_cell
 from radarize.signal.bearings import BEARINGS
 from radarize.signal.maps import Maps
@@ -31,7 +32,7 @@ def on_grid(label: Float[np.ndarray, "frame bearing"], own: Grid, known: Grid) -
     return np.where((label < 0) | (found > known.rows - 0.5), np.float32(-1), found)
 
 
-class RadarHd(Task):
+class RadarHd(Task[Tensor]):
     """Pictures of first surfaces, drawn from the true scan: the lidar of the original.
 
     Labels are scans in range bins, -1 where nothing is in reach.
@@ -55,9 +56,11 @@ class RadarHd(Task):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return pictured(net(maps), label)
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         logits = net(maps)
-        return torch.cat([pictured(logits, label)[:, None], self._counts(logits, label, net.least)], dim=1)
+        return torch.cat(
+            [pictured(logits, label)[:, None], self._counts(logits, label, net.get_buffer("least"))], dim=1
+        )
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
         loss, near, told, there = means.tolist()
@@ -67,7 +70,7 @@ class RadarHd(Task):
             "share_right_of_returned": near / max(told, 1e-9),
         }
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Choose the probability from which the first cell on a bearing is returned: the best F1 of returned ranges."""
         choices = torch.arange(0.1, 0.95, 0.05)
         counts = torch.zeros(len(choices), 3)
@@ -75,7 +78,7 @@ class RadarHd(Task):
             logits = net(maps)
             counts += torch.stack([self._counts(logits, label, least).sum(dim=0).cpu() for least in choices])
         near, told, there = counts.T
-        net.least.fill_(choices[(2 * near / (told + there).clamp_min(1)).argmax()])
+        net.get_buffer("least").fill_(choices[(2 * near / (told + there).clamp_min(1)).argmax()])
 
     def _counts(self, logits: Tensor, label: Tensor, least: Tensor) -> Int[Tensor, "item 3"]:
         """Bearings with a range that is right, with any, and that should have one."""

@@ -15,7 +15,8 @@ from radarize.baselines.rnin.network import LASTS, SAMPLES, RninNet
 from radarize.io.recording import Recording
 from radarize.io.tum import planar
 from radarize.learning.features.table import FeatureTable, Reading
-from radarize.learning.task import Inputs, Motion, Settings
+from radarize.learning.nets.weights import Network
+from radarize.learning.task import Motion, Settings
 from radarize.odometry.inertial import GRAVITY, Imu, instants
 
 
@@ -49,13 +50,13 @@ class Rnin(Motion):
     def spacings(self, frame_period: float) -> Sequence[int]:
         return (max(1, round(LASTS / frame_period)),)
 
-    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item window"]) -> Inputs:
+    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item window"]) -> Tensor:
         return table.sensed["levelled"][frames].float()
 
     def label(self, table: FeatureTable, frames: Int[Tensor, "item window"]) -> Float[Tensor, "item window 3"]:
         return table.truth["displacement"][frames]
 
-    def augment(self, windows: Tensor, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:
+    def augment(self, windows: Tensor, label: Tensor, generator: Generator) -> tuple[Tensor, Tensor]:
         """Any heading, biases of up to 0.1 m/s^2 and 0.002 rad/s, and axes off level by up to 5 deg."""
         count = len(label)
         yaw, way, size = (torch.rand(count, generator=generator, device=label.device) for _ in range(3))
@@ -75,7 +76,7 @@ class Rnin(Motion):
         likelihood = 0.5 * (error * (-log_deviation).exp()).square() + log_deviation
         return displaced(mean, label) + likelihood.sum(dim=2).mean(dim=1)
 
-    def judge(self, net: nn.Module, windows: Tensor, label: Tensor) -> Tensor:
+    def judge(self, net: Network, windows: Tensor, label: Tensor) -> Tensor:
         judged = self._judged(*net.estimate(windows), label[:, -1, :2])
         judged[:, 0] = displaced(net(windows)[0], label)
         return judged

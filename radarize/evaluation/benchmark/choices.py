@@ -38,12 +38,18 @@ class NamedWalk:
             places = planar(recording.read("truth/pose"))[:, :2]
             metres = float(np.linalg.norm(np.diff(places[np.isfinite(places).all(axis=1)], axis=0), axis=1).sum())
         simulated = str(about.get("source", "")).startswith("radarsim")
-        return cls(str(about.get("scene", "-")), int(about["seed"]) if "seed" in about else None, metres, simulated)
+        return cls(
+            str(about.get("scene", "-")), int(str(about["seed"])) if "seed" in about else None, metres, simulated
+        )
 
     @classmethod
     def radarhd(cls, number: int) -> "NamedWalk":
         """One of RadarHD's repository."""
         return cls(f"radarhd {number}", None, None, False)
+
+
+#: Seeds by scene; None: whatever its seed.
+Seeds = dict[str, tuple[int | None, ...]]
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,7 @@ class Choice:
     """
 
     settings: str
-    recordings: dict[str, tuple[int | None, ...]]
+    recordings: Seeds
     looked_at: int = 0
 
     def among(self, walks: Sequence[NamedWalk]) -> int:
@@ -67,7 +73,7 @@ class Choice:
 
 
 #: The recordings of `radarsim dataset evaluation`.
-EVALUATION = {
+EVALUATION: Seeds = {
     "A_0": (3843186689914928031, 780396667974010872, 6012359190105836070),
     "B_0": (556999854290578444, 3965592381051175602, 4509946747521611137),
     "C_0": (320473786174684946, 8865018802045166952, 60825445440634261),
@@ -75,18 +81,18 @@ EVALUATION = {
     "office": (1929245240579931105, 3971611656923845614, 7440840146975223735),
 }
 #: Radar walks that `benchmarks.slam_backend` once had.
-BACK_END = {"plain": (1,), "office": (11, 12), "floor": (3, 4, 2, 5), "corridor": (3, 1)}
+BACK_END: Seeds = {"plain": (1,), "office": (11, 12), "floor": (3, 4, 2, 5), "corridor": (3, 1)}
 
 #: 20 s by hand, on a cart and on a robot in buildings of styles A and B with seed 201: the first six of a data set that
 #: was made for this, seed 2027.
-ODOMETRY = {
+ODOMETRY: Seeds = {
     "A201_0": (9190419259301911946, 4383969069773452203, 2041095273713069072),
     "B201_0": (6188719661804238459, 5385831122607816562, 3985246152463333794),
 }
 
 #: 60 s by hand in buildings of styles A to D with seeds 301 to 304, and by cart in A; in the office 20 s by cart, and
 #: the demo's 40 s by hand.
-TURNS = {
+TURNS: Seeds = {
     "A_0": (2117315051042397337, 5685118323643141256),
     "B_0": (8563469454355660152,),
     "C_0": (8841798845398845653,),
@@ -95,7 +101,7 @@ TURNS = {
 }
 
 #: 60 s by hand in A to D, seeds 301 to 304, and by cart in A to C.
-LASTING = {
+LASTING: Seeds = {
     "A_0": (2117315051042397337, 5685118323643141256),
     "B_0": (8563469454355660152, 439907299986115612),
     "C_0": (8841798845398845653, 161484493570950127),
@@ -103,11 +109,11 @@ LASTING = {
 }
 
 #: 20 s by hand in a building of style A, seed 301, and by cart in C, seed 303, as up to eleven radars see them.
-RADARS = {"A_0": (4309744100947278613,), "C_0": (2078735959714348781,)}
+RADARS: Seeds = {"A_0": (4309744100947278613,), "C_0": (2078735959714348781,)}
 
 #: 20 s by hand and by cart in buildings of styles A and C with seeds 651 and 652, and in the floor plan csail, each as
 #: the presets long-range and radarhd see it.
-FARTHER = {
+FARTHER: Seeds = {
     "A_0": (3066841380677396802, 8247674105515224821),
     "C_0": (3504239006966917070, 8856944910352557103),
     "csail": (1087032148287752839, 6762958810614420727),
@@ -115,7 +121,7 @@ FARTHER = {
 
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 641 to 644 and in the office of seed 645, a second
 #: of every six without frames.
-GAPS = {
+GAPS: Seeds = {
     "A_0": (7181035311901936072,),
     "A_1": (7527069841251442446,),
     "B_0": (2692997763506710727,),
@@ -126,7 +132,7 @@ GAPS = {
 }
 
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 641 to 644 and in the office of seed 645.
-EVERY = {
+EVERY: Seeds = {
     "A_0": (8544814540943936013, 7181035311901936072),
     "A_1": (7527069841251442446, 5585841261737231163),
     "B_0": (5602323644526445679, 2692997763506710727),
@@ -138,7 +144,7 @@ EVERY = {
 }
 
 #: Those, and 60 s by hand, by cart and by robot in the floor plan csail, whose walls stand in several directions.
-WALLS = EVERY | {
+WALLS: Seeds = EVERY | {
     "csail": (
         187465492810887943,
         1665936419561694009,
@@ -152,7 +158,7 @@ WALLS = EVERY | {
 #: 20 s by hand and by cart, five people about, in buildings of styles A to D with seeds 661 to 664 and in the office of
 #: seed 665, each as the presets radarize and two-tx and two boards at 60 GHz see it; and the walks above and the
 #: demo's, by radarize.
-ARRAYS = {
+ARRAYS: Seeds = {
     "A_0": (6781302003198438093, 5360434777983573593, *EVERY["A_0"]),
     "A_1": EVERY["A_1"],
     "B_0": (6242325759239796006, *EVERY["B_0"]),
@@ -165,7 +171,7 @@ ARRAYS = {
 
 #: 20 s by hand in buildings of styles A and C with seeds 671 and 673, and by cart in B and D with 672 and 674, by the
 #: preset radarize with frames at 5 Hz, and with 10 loops.
-COARSE = {
+COARSE: Seeds = {
     "A_0": (3806646801936172637,),
     "B_0": (7483608823468009466,),
     "C_0": (139721640175536573,),
@@ -174,7 +180,7 @@ COARSE = {
 
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 611 to 614, and as many in A to D and the office
 #: with seeds 621 to 625.
-STRETCH = {
+STRETCH: Seeds = {
     "A_0": (1916884242829496425, 6086624209057059746, 7925444958452925833, 6592575667246285716),
     "B_0": (4195935064897767939, 3447146838335465922, 5990492376489489253, 5578840800240716763),
     "C_0": (3504363901255723526, 2355549049601989642, 344021510664894548, 7399956482383176481),
@@ -184,7 +190,7 @@ STRETCH = {
 
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 631 to 634, in the office of seed 635, and in the
 #: floor plan csail, where most walls are out of reach.
-BEARINGS = {
+BEARINGS: Seeds = {
     "A_0": (2247577326889971198, 7365974476725033376),
     "A_1": (8537091727329532442,),
     "B_0": (3881278284628967287, 7874717703389750089),
@@ -197,10 +203,10 @@ BEARINGS = {
 }
 
 #: Six of RadarHD's training walks.
-REAL = {NamedWalk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
+REAL: Seeds = {NamedWalk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
 
 #: 60 s by robot in those buildings.
-ROBOTS = {
+ROBOTS: Seeds = {
     "A_0": (2106597204298039597,),
     "A_1": (4007340081320726866,),
     "B_0": (1933094628439845999,),
@@ -212,13 +218,13 @@ ROBOTS = {
 }
 
 #: What odometry claims of motions over any time; but for a walk by hand in csail that is lost anyway.
-CLAIMS = WALLS | {scene: (*WALLS[scene], *seeds) for scene, seeds in ROBOTS.items()}
+CLAIMS: Seeds = WALLS | {scene: (*WALLS[scene], *seeds) for scene, seeds in ROBOTS.items()}
 
 #: What score closures need, each in three or six variants of the other settings, so that luck counts for less.
-CLOSURES = STRETCH | REAL
+CLOSURES: Seeds = STRETCH | REAL
 
 #: The walks that `benchmarks.unseen` once had, through buildings with seeds 4001 to 4005 and two floor plans.
-REVERSED = {
+REVERSED: Seeds = {
     "A_0": (4685120208187634443, 6618024391697106542, 6521432179179074455),
     "A_1": (8495296017601023444, 2262171279084691540, 3569678933891587897),
     "B_0": (1545003881051843651, 5110916572368462979, 6007960445364185434),
@@ -262,7 +268,7 @@ REVERSED = {
 #: RadarHD's training walks, one by one and all together.
 #: RadarHD's training walks.
 TRAINING = (*range(112, 117), *range(118, 124), *range(125, 132), *range(133, 139), 140)
-PICTURES = {NamedWalk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
+PICTURES: Seeds = {NamedWalk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),

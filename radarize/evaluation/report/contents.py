@@ -71,7 +71,7 @@ def _readable(value: float, unit: str) -> tuple[str, str]:
 
 def data_sets(found: dict) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Head and rows of a table of the data sets that `contents` found."""
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
         for name, item in found["data_sets"].items()
     ]

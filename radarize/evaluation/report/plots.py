@@ -41,7 +41,7 @@ def line(
     color: str,
     width: float = 2.0,
     row: int = 1,
-    **style,
+    **style: object,
 ) -> None:
     """A line through points, (x, y) each or all x and all y, with gaps where these are not finite.
 

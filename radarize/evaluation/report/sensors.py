@@ -1,6 +1,8 @@
 """Pictures of what sensors beside the radar recorded, for the page of a recording."""
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from scipy.spatial.transform import Rotation
 
 from radarize.evaluation.report.drawings import canvas
@@ -40,30 +42,30 @@ def show_sensors(page: Page, recording: Recording, frames: list[int]) -> None:
         _draw_lines(page, time, {"position, m": off, "rotation, deg": np.degrees(turn)})
 
 
-def _depth(axis, recording: Recording, pictures: np.ndarray) -> None:
+def _depth(axis: Axes, recording: Recording, pictures: np.ndarray) -> None:
     drawn = axis.imshow(np.where(pictures[0] > 0, pictures[0] / 1000, np.nan), cmap="viridis", aspect="auto")
     axis.set(xticks=[], yticks=[])
     axis.figure.colorbar(drawn, ax=axis, label="m")
 
 
-def _occupancy(axis, recording: Recording, cells: np.ndarray) -> None:
+def _occupancy(axis: Axes, recording: Recording, cells: np.ndarray) -> None:
     _polar(axis, recording, "truth/occupancy", cells[0], "viridis", 2)
 
 
-def _cause(axis, recording: Recording, cells: np.ndarray) -> None:
+def _cause(axis: Axes, recording: Recording, cells: np.ndarray) -> None:
     drawn = _polar(axis, recording, "truth/cause", np.where(cells[0] == _NONE, np.nan, cells[0]), "tab10", 9)
     names = recording.labels("truth/cause")
     axis.figure.colorbar(drawn, ax=axis).set_ticks(range(len(names)), labels=names, fontsize=7)
 
 
-def _polar(axis, recording: Recording, name: str, cells: np.ndarray, colors: str, top: int):
+def _polar(axis: Axes, recording: Recording, name: str, cells: np.ndarray, colors: str, top: int) -> QuadMesh:
     ranges, azimuths = recording.read(f"{name}_ranges"), recording.read(f"{name}_azimuths")
     x, y = -ranges[:, None] * np.sin(azimuths), ranges[:, None] * np.cos(azimuths)
     axis.set(aspect="equal", xlabel="to the right, m", ylabel="forward, m")
     return axis.pcolormesh(x, y, cells, cmap=colors, vmin=0, vmax=top, rasterized=True)
 
 
-def _points(axis, recording: Recording, cloud: np.ndarray) -> None:
+def _points(axis: Axes, recording: Recording, cloud: np.ndarray) -> None:
     limit, reach = recording.config.max_velocity, recording.config.max_range
     drawn = axis.scatter(-cloud[:, 1], cloud[:, 0], c=cloud[:, 3], cmap="coolwarm", vmin=-limit, vmax=limit, s=14)
     axis.set(aspect="equal", xlim=(-reach, reach), ylim=(0, reach), xlabel="to the right, m", ylabel="forward, m")

@@ -1,7 +1,7 @@
 """Figures of runs in words: the rows of tables, on a page and in the terminal alike."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from radarize.evaluation.figures import Figure
 from radarize.odometry.blindness import BlindSpans
@@ -65,18 +65,18 @@ class PrintedTable(NamedTuple):
     """Words in columns; `numbers` are the columns that hold figures."""
 
     head: Sequence[str]
-    rows: list[tuple[str, ...]]
+    rows: Sequence[tuple[str, ...]]
     numbers: Sequence[int] = (1,)
 
 
-def trajectories(metrics: Mapping[str, object]) -> PrintedTable:
+def trajectories(metrics: Mapping[str, Any]) -> PrintedTable:
     """Errors of a run's trajectories; the last column says what they mean."""
     names = [name for name in ("odometry", "slam") if name in metrics]
     rows = [(f.words, *(f.text(metrics[name]) for name in names), f.meaning) for f in _TRAJECTORY]
     return PrintedTable(("trajectory", *names, "what it means"), rows, range(1, 1 + len(names)))
 
 
-def parts(metrics: Mapping[str, object]) -> Iterator[PrintedTable]:
+def parts(metrics: Mapping[str, Any]) -> Iterator[PrintedTable]:
     """Errors of a run's map, scans and velocities, as far as they are known."""
     for name, figures in _PARTS.items():
         if name in metrics:

@@ -28,7 +28,7 @@ from radarize.signal.heatmaps import Heatmaps
 from radarize.signal.points import COLUMNS
 
 #: When, on which topic, and what.
-Event = tuple[float, str, object]
+Event = tuple[float, str, Message]
 BASE, ODOM, RADAR = "base_link", "odom", "radar"
 CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
 _NOWHERE = np.array([0.0, 0, 0, 0, 0, 0, 1])
@@ -47,17 +47,16 @@ def export_ros2(source: Path, output: Path, *, run: Path | None, progress: Calla
     if source.is_dir():
         if run is not None:
             raise InputError(f"{source}: is a run's folder, and {run} another, expected a recording and a run")
-        source, run = None, source
-    log = Log.read(Path(run)) if run is not None else None
-    if source is None:
+        log = Log.read(source)
         return _write(output, [_scans(log, None), _odometry(log)], [], "/scan", len(log.times), progress)
+    log_of_run = Log.read(run) if run is not None else None
     with Recording(source) as recording:
         if not len(recording):
             raise InputError(f"{source}: has no whole frame, expected at least one")
         streams = [_heatmaps(recording), _truth(recording), _depth(recording), _inertial(recording), _points(recording)]
-        if log is not None:
-            _check_pair(recording, log, run)
-            streams += [_scans(log, recording.config), _odometry(log)]
+        if run is not None and log_of_run is not None:
+            _check_pair(recording, log_of_run, run)
+            streams += [_scans(log_of_run, recording.config), _odometry(log_of_run)]
         return _write(output, streams, _mounts(recording), "/radar/heatmap", len(recording), progress)
 
 
@@ -74,8 +73,9 @@ def _write(
     with BagWriter(output) as bag:
         for time, topic, content in heapq.merge(*streams, key=lambda event: event[0]):
             if not placed:
-                placed = [_transform(time, *mount) for mount in ((BASE, RADAR, _NOWHERE), *mounts)]
-                bag.write("/tf_static", time, message("tf2_msgs/msg/TFMessage", transforms=placed))
+                static = [_transform(time, *mount) for mount in ((BASE, RADAR, _NOWHERE), *mounts)]
+                bag.write("/tf_static", time, message("tf2_msgs/msg/TFMessage", transforms=static))
+                placed = True
             bag.write(topic, time, content)
             if topic == counted:
                 done += 1
@@ -242,7 +242,7 @@ def _inertial(recording: Recording) -> Iterator[Event]:
         columns = (recording.rows(f"imu/{name}", k, k + 1) for name in ("time", "accelerometer", "gyroscope"))
         for time, force, turn in zip(*columns, strict=True):
             yield time, "/imu", message(
-                "sensor_msgs/msg/Imu", header=header(time, "imu"), orientation=vector([0, 0, 0, 1], "Quaternion"),
+                "sensor_msgs/msg/Imu", header=header(time, "imu"), orientation=vector(np.array([0, 0, 0, 1]), "Quaternion"),
                 orientation_covariance=unknown, angular_velocity=vector(turn), angular_velocity_covariance=np.zeros(9),
                 linear_acceleration=vector(force), linear_acceleration_covariance=np.zeros(9),
             )  # fmt: skip

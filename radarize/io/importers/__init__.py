@@ -63,7 +63,8 @@ def import_recording(
     products = _poses(given.poses) if given.poses else {}
     format = _format(source, given)
     if format.write:
-        return format.write(source, output, given, products, progress or (lambda done, total: None))
+        return format.write(source, output, given, products, progress)
+    assert format.open is not None  # a format has one or the other
     capture = format.open(source, given, output.parent)
     batches = iter(capture.batches)
     first = next(batches)
@@ -95,7 +96,7 @@ def import_recording(
             start_time = stamps[0] if not done else start_time
             done, last = done + len(batch.valid), stamps[-1]
             progress(done, max(done, capture.expected_frames))
-        if products:
+        if given.poses:
             end = last + radar.frame_period
             capture.warnings += _apart(products["truth/time"].data, start_time, end, given.poses)
         capture.warnings += writer.losses.warnings()

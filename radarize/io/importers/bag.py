@@ -17,7 +17,7 @@ from radarize.io.importers.companions import ChipPoints, Companion, Depth, Inert
 from radarize.io.importers.format import Format
 from radarize.io.importers.frames import BagFrames, Stamps
 from radarize.io.importers.parameters import Given
-from radarize.io.importers.rosbag import Bag, is_frame
+from radarize.io.importers.rosbag import Bag, Message, is_frame
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
 from radarize.radar.presets import PRESETS
@@ -79,7 +79,7 @@ def open_bag(path: Path, given: Given) -> Capture:
     return capture
 
 
-def _first(bag: Bag, topic: str) -> tuple[float, object]:
+def _first(bag: Bag, topic: str) -> tuple[float, Message]:
     """Time of receipt (s) and content of a topic's first message."""
     for _, nanoseconds, message in bag.messages([topic]):
         return 1e-9 * nanoseconds, message
@@ -112,7 +112,7 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
     return radar, others, warnings
 
 
-def _configure(path: Path, frame: object, given: Given) -> tuple[RadarConfig, tuple[str, ...]]:
+def _configure(path: Path, frame: Message, given: Given) -> tuple[RadarConfig, tuple[str, ...]]:
     with explained(f"{path}: has frames without usable shape, rx, tx and data"):
         shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
         rx, tx = _antennas(frame.rx), _antennas(frame.tx)
@@ -130,7 +130,7 @@ def _configure(path: Path, frame: object, given: Given) -> tuple[RadarConfig, tu
     return given.configure(str(path), said)
 
 
-def _antennas(field: object) -> tuple[int, ...]:
+def _antennas(field: int | np.ndarray) -> tuple[int, ...]:
     """Antennas in use, 0-based, from a bit mask or from one truth value an antenna."""
     values = [int(value) for value in np.atleast_1d(field)]
     if len(values) == 1 and values[0] > 1:
@@ -138,7 +138,7 @@ def _antennas(field: object) -> tuple[int, ...]:
     return tuple(k for k, value in enumerate(values) if value)
 
 
-def _calibrated(config: RadarConfig, frame: object, name: str, warnings: list[str]) -> RadarConfig:
+def _calibrated(config: RadarConfig, frame: Message, name: str, warnings: list[str]) -> RadarConfig:
     """The configuration with the frame's calibration, unless it has one of its own."""
     with explained(f"{name}: has frames without usable range_bias and rx_phase_bias"):
         pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)

@@ -56,7 +56,7 @@ def whole_name(source: Path) -> Path:
 def all_zero(words: Int16[np.ndarray, "word"], config: RadarConfig) -> Bool[np.ndarray, "frame loop tx"]:
     """Chirps (physical order) of nothing but zeros: capture programs put them where packets were lost."""
     loops, tx = config.frame_shape[:2]
-    fired = words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)).any(axis=3)
+    fired = np.any(words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)), axis=3)
     return ~fired[:, :, list(config.slot)]
 
 

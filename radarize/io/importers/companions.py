@@ -13,6 +13,7 @@ from jaxtyping import Float, UInt16
 from scipy.spatial.transform import Rotation, Slerp
 
 from radarize.io.errors import InputError
+from radarize.io.importers.rosbag import Message
 from radarize.io.pixels import read_picture
 from radarize.io.pose import OPTICAL_TURN
 from radarize.io.recording import Product, Stream
@@ -31,7 +32,7 @@ _MOST_PIXELS = 1 << 24
 STRIP = {(100, 848): (423.993, 423.993, 432.966, 50.938)}
 
 
-def header_time(message: object) -> float:
+def header_time(message: Message) -> float:
     """A message's own stamp, s; minus infinity where it has no header."""
     header = getattr(message, "header", None)
     return header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else -np.inf
@@ -51,14 +52,14 @@ class Companion(ABC):
     streams: Mapping[str, Stream]
     products: Mapping[str, Product] = {}
 
-    def __init__(self, config: RadarConfig, first: object):
+    def __init__(self, config: RadarConfig, first: Message):
         self.config = config
         self.damaged = 0
         self._own_clock: bool | None = None
         self._last = -np.inf
         self._waiting: deque[tuple] = deque()
 
-    def take(self, message: object, received: float) -> None:
+    def take(self, message: Message, received: float) -> None:
         """Keep a message until its frame comes.
 
         Args:
@@ -77,7 +78,7 @@ class Companion(ABC):
                 self.damaged += 1
 
     @abstractmethod
-    def read(self, message: object) -> tuple:
+    def read(self, message: Message) -> tuple:
         """What is kept of a message."""
 
     @abstractmethod
@@ -114,7 +115,7 @@ class TrackedPose(Companion):
         "truth/velocity": Stream((6,), "f8", "m/s, rad/s", "linear, then angular velocity of the tracking camera"),
     }
 
-    def read(self, message: object) -> tuple:
+    def read(self, message: Message) -> tuple:
         """Pose."""
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         return (np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]),)
@@ -164,7 +165,7 @@ def _interpolated(known: list[tuple[float, np.ndarray]], at: Float[np.ndarray, "
 class Depth(Companion):
     """Depth pictures, the nearest to the middle of each burst; all 0 where none is nearer than half a frame."""
 
-    def __init__(self, config: RadarConfig, first: object):
+    def __init__(self, config: RadarConfig, first: Message):
         super().__init__(config, first)
         self._shape = depth_picture(first).shape
         self.streams = {
@@ -180,7 +181,7 @@ class Depth(Companion):
         about = "fx fy cx cy of the depth camera"
         self.products = {"truth/depth_intrinsics": Product(np.asarray(pinhole, float), "pixels", about)}
 
-    def read(self, message: object) -> tuple:
+    def read(self, message: Message) -> tuple:
         """The picture as it came: unpacked only if a frame wants it."""
         return (message,)
 
@@ -203,7 +204,7 @@ class Depth(Companion):
         return {"truth/depth": pictures}
 
 
-def depth_picture(message: object) -> UInt16[np.ndarray, "row column"]:
+def depth_picture(message: Message) -> UInt16[np.ndarray, "row column"]:
     """Depth in mm of an Image (``16UC1``, ``32FC1``) or a CompressedImage of image transport ``compressedDepth``.
 
     Raises:
@@ -218,17 +219,17 @@ def depth_picture(message: object) -> UInt16[np.ndarray, "row column"]:
         rows, step = int(message.height), int(message.step)
         if not 0 < int(message.width) * kind.itemsize <= step or data.size < rows * step:
             raise InputError(f"depth picture of {message.width} x {rows} has {data.size} bytes, expected {rows * step}")
-        picture = data[: rows * step].reshape(rows, step)[:, : int(message.width) * kind.itemsize]
-        picture = np.ascontiguousarray(picture).view(kind)
-        return picture.astype(np.uint16) if kind.kind == "u" else _millimetres(picture)
-    data = bytes(message.data)
+        used = data[: rows * step].reshape(rows, step)[:, : int(message.width) * kind.itemsize]
+        depth = np.ascontiguousarray(used).view(kind)
+        return depth.astype(np.uint16) if kind.kind == "u" else _millimetres(depth)
+    packed = bytes(message.data)
     picture = read_picture(
-        io.BytesIO(data[_DEPTH_HEADER:]), f"depth picture ({message.format})", most=_MOST_PIXELS, gray=False
+        io.BytesIO(packed[_DEPTH_HEADER:]), f"depth picture ({message.format})", most=_MOST_PIXELS, gray=False
     )
     if picture.ndim != 2:
         raise InputError(f"depth picture ({message.format}) has {picture.ndim} axes, expected one grey value a pixel")
     if message.format.strip().startswith("32FC1"):  # quantised inverse depth: a / (value - b)
-        scale, offset = np.frombuffer(data[4:_DEPTH_HEADER], "<f4").astype(float)
+        scale, offset = np.frombuffer(packed[4:_DEPTH_HEADER], "<f4").astype(float)
         with np.errstate(divide="ignore"):
             return _millimetres(np.where(picture > 0, scale / (picture - offset), 0))
     return picture.astype(np.uint16)
@@ -251,7 +252,7 @@ class InertialSensor(Companion):
         "imu/gyroscope": Stream((3,), "f4", "rad/s", "angular velocity x y z", "imu/time"),
     }
 
-    def __init__(self, config: RadarConfig, first: object):
+    def __init__(self, config: RadarConfig, first: Message):
         super().__init__(config, first)
         frame = str(getattr(first.header, "frame_id", ""))
         if "optical" in frame:
@@ -263,7 +264,7 @@ class InertialSensor(Companion):
         about = f"x y z qx qy qz qw of the IMU in the radar's frame; {why}; its place is not known"
         self.products = {"imu/mount": Product(place, "m, quaternion", about)}
 
-    def read(self, message: object) -> tuple:
+    def read(self, message: Message) -> tuple:
         """Both vectors."""
         force, turn = message.linear_acceleration, message.angular_velocity
         return (force.x, force.y, force.z, turn.x, turn.y, turn.z)
@@ -282,7 +283,7 @@ class ChipPoints(Companion):
         InputError: clouds without x, y and z as float32.
     """
 
-    def __init__(self, config: RadarConfig, first: object):
+    def __init__(self, config: RadarConfig, first: Message):
         super().__init__(config, first)
         cloud_columns(first)
         about = f"{' '.join(COLUMNS)} of TI's point cloud in the sensor frame, closing velocity positive"
@@ -292,7 +293,7 @@ class ChipPoints(Companion):
             "points/cloud": Stream((len(COLUMNS),), "f4", "m, m/s, dB", about, clock),
         }
 
-    def read(self, message: object) -> tuple:
+    def read(self, message: Message) -> tuple:
         """Points."""
         return (cloud_columns(message),)
 
@@ -307,7 +308,7 @@ class ChipPoints(Companion):
         }
 
 
-def cloud_columns(message: object) -> Float[np.ndarray, "point column"]:
+def cloud_columns(message: Message) -> Float[np.ndarray, "point column"]:
     """Points of a PointCloud2 as `radarize.signal.points.COLUMNS`; what it does not have is not-a-number.
 
     The chip calls receding velocities positive, and what it calls intensity is the SNR in dB (ti_mmwave_rospkg).

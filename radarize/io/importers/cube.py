@@ -92,6 +92,7 @@ class ArrayAxes:
             if known is None:
                 raise InputError(f"{array.name}: has {length} entries on axis {name}, expected {inner} to be given")
             count = given[known]
+            assert count is not None  # it is known
             if length % count:
                 raise InputError(f"{array.name}: has {length} entries on axis {name}, expected a multiple of {count}")
             found[known], found[outer if known == inner else inner] = count, length // count

@@ -15,6 +15,7 @@ from scipy.ndimage import minimum_filter1d
 from scipy.stats import theilslopes
 
 from radarize.io.importers.companions import SAME_CLOCK, header_time
+from radarize.io.importers.rosbag import Message
 from radarize.radar.config import RadarConfig
 
 #: s that a computer may hold frames up, parts of a recording whose least late frames make the line, and share by which
@@ -42,7 +43,7 @@ class Stamps:
         self._received = np.unique(received)
         self._periodic = self._received if from_headers else periodic(self._received, config.frame_period)
 
-    def __call__(self, message: object, received: float) -> float:
+    def __call__(self, message: Message, received: float) -> float:
         """Of a frame, s."""
         if self.latency is None:
             return header_time(message)
@@ -93,7 +94,7 @@ class BagFrames:
         self.last = -np.inf
         self._odd = self._again = 0
 
-    def add(self, time: float, message: object) -> None:
+    def add(self, time: float, message: Message) -> None:
         """Keep a frame, unless it has another size or does not come after the last one."""
         words = np.asarray(message.data)
         if words.dtype.itemsize == 1:

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
 from reprlib import repr as shortened
+from typing import Any, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -35,6 +36,8 @@ uint8[] tx
 uint32[3] shape
 int16[] data
 """
+#: A message as `rosbags` makes it: its fields are those of a definition that is read from the bag.
+Message: TypeAlias = Any
 
 
 class StreamingReader(Reader1):
@@ -133,7 +136,7 @@ class Bag:
             for connection in self._reader.connections
         }
 
-    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, object]]:
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, Message]]:
         """Topic, time of receipt (ns) and content of messages, by ascending time.
 
         Raises:

@@ -106,7 +106,11 @@ def _channel(sensor: Path, meta: dict, name: str, kind: str) -> _Channel:
     """
     about = meta.get(name)
     shape = about.get("shape") if isinstance(about, dict) else None
-    if not isinstance(shape, list) or not all(isinstance(size, int) and 0 < size <= 1 << 16 for size in shape):
+    if (
+        not isinstance(about, dict)
+        or not isinstance(shape, list)
+        or not all(isinstance(size, int) and 0 < size <= 1 << 16 for size in shape)
+    ):
         raise InputError(f"{sensor / 'meta.json'}: {name} is {str(about)[:80]}, expected format, type and shape")
     with explained(f"{sensor / 'meta.json'}: {name}: type", TypeError, ValueError):
         dtype = np.dtype(str(about.get("type"))).newbyteorder("<")
@@ -179,7 +183,7 @@ def _filled(words: Int16[np.ndarray, "frame loop tx rx word"]) -> Bool[np.ndarra
     """Chirps with a run of zeros."""
     chirps = words.reshape(*words.shape[:3], -1)
     runs = chirps[..., : chirps.shape[3] // _RUN * _RUN].reshape(*words.shape[:3], -1, _RUN)
-    return (~runs.any(axis=4)).any(axis=3)
+    return np.any(~np.any(runs, axis=4), axis=3)
 
 
 FORMAT = Format(

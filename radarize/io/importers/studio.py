@@ -24,6 +24,7 @@ def open_studio(source: Path, given: Given) -> Capture:
     setup = load_json(setups[0]) if setups else {}
     given = given.or_else(*load_studio(settings, setups[0] if setups else None))
     config, _ = given.configure(str(settings))
+    files: Sequence[Path]
     files, filled = _captured(setup, folder)
     if not source.is_dir():
         files = parts(source)

@@ -66,14 +66,14 @@ def _copied(left: Recording, output: Path) -> None:
 def along(recording: Recording, names: list[str]) -> tuple[dict[str, Stream], dict[str, Product]]:
     """What came along with the samples, of some names, as `RecordingWriter` takes it: streams, and what was written
     once."""
-    streams, products = {}, {}
+    streams: dict[str, Stream] = {}
+    products: dict[str, Product] = {}
     for name in names:
-        data, about = recording.file[name], recording.describe(name)
+        data = recording.file[name]
+        unit, about = (str(recording.describe(name)[key]) for key in ("unit", "about"))
         if "clock" in data.attrs:
             clock = str(data.attrs["clock"])
-            streams[name] = Stream(
-                data.shape[1:], data.dtype.str, about["unit"], about["about"], clock, recording.labels(name)
-            )
+            streams[name] = Stream(data.shape[1:], data.dtype.str, unit, about, clock, recording.labels(name))
         else:
-            products[name] = Product(recording.read(name), about["unit"], about["about"])
+            products[name] = Product(recording.read(name), unit, about)
     return streams, products

@@ -104,7 +104,7 @@ class RecordingWriter:
         self.frames, self.raw, self.losses = 0, raw, Losses(config.frame_period)
         self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
-        self._pending: list[tuple] = []
+        self._pending: list[np.ndarray] = []
         self._unflushed = self._waiting = 0  # frames, bytes
         if not overwrite:
             spare(self.path)
@@ -120,13 +120,19 @@ class RecordingWriter:
                 self.part.unlink()
                 raise
             self._file = h5py.File(self.part, "w", libver=FORMAT)
-            self._create(cfg_text, attributes or {}, streams or {}, products or {})
+            self._create(self._file, cfg_text, attributes or {}, streams or {}, products or {})
             self._held = hold(self.part)  # HDF5 itself does so until readers may follow
         except OSError as error:
             raise _failed("write", self.part, error) from error
 
-    def _create(self, cfg_text, attributes, streams, products) -> None:
-        file = self._file
+    def _create(
+        self,
+        file: h5py.File,
+        cfg_text: str,
+        attributes: Mapping[str, object],
+        streams: Mapping[str, Stream],
+        products: Mapping[str, Product],
+    ) -> None:
         file.attrs.update({"format": _FORMAT, "radarize_version": __version__, **_storable(attributes)})
         radar = file.create_group("radar")
         radar.attrs["config"] = self.config.model_dump_json()
@@ -156,16 +162,17 @@ class RecordingWriter:
             InputError: the shapes do not fit the configuration.
             DiskFull: they may be left out, and later ones appended.
         """
-        if self.raw and adc.shape[1:] != self.config.frame_shape:
-            raise InputError(
-                f"{self.path}: frames have shape {adc.shape[1:]}, expected {self.config.frame_shape} "
-                "(loop, tx, rx, sample, iq) from the configuration"
-            )
-        if valid is None:
-            valid = np.ones((len(time), *self.config.frame_shape[:2]), bool)
         rows = dict(rows or {})
         if self.raw:
+            assert adc is not None  # None is for recordings without samples
+            if adc.shape[1:] != self.config.frame_shape:
+                raise InputError(
+                    f"{self.path}: frames have shape {adc.shape[1:]}, expected {self.config.frame_shape} "
+                    "(loop, tx, rx, sample, iq) from the configuration"
+                )
             rows["radar/adc"] = adc
+        if valid is None:
+            valid = np.ones((len(time), *self.config.frame_shape[:2]), bool)
         with self._telling("write"):
             self._claim(sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
@@ -197,9 +204,14 @@ class RecordingWriter:
             raise OSError(errno.ENOSPC, FULL)
         self._waiting = waiting
 
+    @property
+    def _opened(self) -> h5py.File:
+        assert self._file is not None  # once the writer is made
+        return self._file
+
     def _extend(self, name: str, data: np.ndarray) -> None:
         if len(data):
-            _lengthen(self._file[name], data)
+            _lengthen(self._opened[name], data)
 
     def annotate(self, **attributes: object) -> None:
         """Attributes of the file that are known only at the end; stored when the writer is closed."""
@@ -207,14 +219,14 @@ class RecordingWriter:
 
     def flush(self) -> None:
         """Make every appended frame visible to readers. Times go last: a frame counts once its time is there."""
-        self._file.flush()
+        self._opened.flush()
         self._waiting = 0
         self._claim(0)  # HDF5 cuts the file to what it holds
         for times in self._pending:
             self._extend("radar/time", times)
             self.frames += len(times)
         self._pending.clear()
-        self._file["radar/time"].flush()
+        self._opened["radar/time"].flush()
         self._unflushed = 0
 
     @contextmanager
@@ -243,7 +255,7 @@ class RecordingWriter:
     def __enter__(self) -> "RecordingWriter":
         return self
 
-    def __exit__(self, kind, error, trace) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         # An interrupt ends a recording, it does not spoil it: everything appended so far is kept under its name.
         if kind is None or issubclass(kind, KeyboardInterrupt):
             self.close()

@@ -81,7 +81,7 @@ class Windows:
         found = []
         for spacing in self.spacings:
             rows, there = spaced(stamps, len(new), self.frames, spacing * self._period, self._period)
-            found.append(Shown(frames[torch.from_numpy(rows)], there.all(axis=1), rows[:, -1] - rows[:, 0]))
+            found.append(Shown(frames[torch.from_numpy(rows)], np.all(there, axis=1), rows[:, -1] - rows[:, 0]))
         kept = max(len(frames) - self._reach, 0)
         self._past, self._stamps = frames[kept:], stamps[kept:]
         return found

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import onnxruntime
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from radarize.learning.nets.folded import folded
 from radarize.learning.nets.weights import Header, Network, load
@@ -35,7 +35,7 @@ class Compiled:
         net: the same network, folded; header: the same.
     """
 
-    def __init__(self, net: nn.Module, header: Header):
+    def __init__(self, net: Network, header: Header):
         self.net, self.header = folded(net), header
 
     def estimate(self, *inputs: Tensor) -> Tensor | tuple[Tensor, ...]:

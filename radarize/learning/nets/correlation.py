@@ -23,6 +23,8 @@ class Moved(nn.Module):
         step: m from row to row.
     """
 
+    azimuths: Float[Tensor, "azimuth"]
+
     def __init__(self, step: float):
         super().__init__()
         self.step = step
@@ -55,6 +57,9 @@ class Correlation(nn.Module):
     Attributes:
         channels: of the image, for every frame but the newest.
     """
+
+    spectrum: Float[Tensor, "2 frequency column"]
+    shift: Float[Tensor, "2 frequency shift"]
 
     def __init__(self, maps: int, columns: int, features: int = 8, turns: int = 25, steps: int = 1):
         super().__init__()

@@ -9,21 +9,21 @@ from torch import nn
 
 from radarize.io.replacing import replacing
 from radarize.learning.nets.folded import folded
-from radarize.learning.nets.weights import Header, example
+from radarize.learning.nets.weights import Header, Network, example
 
 
 class Estimate(nn.Module):
     """A network whose `forward` is its `estimate`."""
 
-    def __init__(self, net: nn.Module):
+    def __init__(self, net: Network):
         super().__init__()
         self.net = net
 
-    def forward(self, *inputs: torch.Tensor):
+    def forward(self, *inputs: torch.Tensor) -> torch.Tensor | tuple[torch.Tensor, ...]:
         return self.net.estimate(*inputs)
 
 
-def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
+def export_onnx(net: Network, header: Header, path: Path) -> Path:
     """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
     of items, and for turns ``travel`` (item, 2), or what else the network names; outputs ``estimate`` and
     ``covariance``, or ``probability``.
@@ -38,7 +38,7 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     return path
 
 
-def export_graph(net: nn.Module, header: Header, path: Path) -> Path:
+def export_graph(net: Network, header: Header, path: Path) -> Path:
     """Write the same without weights, for `compiled`: whoever runs it lends it those of a file."""
     import onnx  # not installed with every radarize
 
@@ -59,13 +59,16 @@ def export_graph(net: nn.Module, header: Header, path: Path) -> Path:
     return path
 
 
-def _program(net: nn.Module, header: Header, **how: object) -> torch.onnx.ONNXProgram:
+def _program(net: Network, header: Header, optimize: bool = True) -> torch.onnx.ONNXProgram:
     # torch's exporter lists what it would do with torchvision.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     inputs, item = example(net, header), torch.export.Dim("item")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return torch.onnx.export(
+        program = torch.onnx.export(
             Estimate(net).cpu(), inputs, input_names=list(net.inputs), output_names=list(net.outputs),
-            dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False, **how,
+            dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False,
+            optimize=optimize,
         )  # fmt: skip
+    assert program is not None  # as of dynamo=True
+    return program

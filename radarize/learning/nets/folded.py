@@ -2,12 +2,15 @@
 
 from copy import deepcopy
 from itertools import pairwise
+from typing import TypeVar
 
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+_Net = TypeVar("_Net", bound=nn.Module)
 
-def folded(net: nn.Module) -> nn.Module:
+
+def folded(net: _Net) -> _Net:
     """A copy of a trained network that says the same in two thirds of the time."""
     net = deepcopy(net).eval()
     for module in net.modules():

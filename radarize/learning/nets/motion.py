@@ -35,6 +35,7 @@ class MotionNet(Network):
     scaled = True
     dimensions: int
     stride: tuple[int, int]
+    spread: Float[Tensor, ""]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int, channels: int):
         super().__init__(frames, maps, width)
@@ -59,6 +60,7 @@ class TranslationNet(MotionNet):
     fastest = 4.0
     #: Rows that the second look sees above and below the ridge.
     near = 6
+    directions: Float[Tensor, "2 column"]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16, step: float = 0.1146):
         super().__init__(frames, maps, width, frames * len(maps))

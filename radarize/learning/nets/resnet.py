@@ -62,7 +62,7 @@ class ResNet18(nn.Module):
         if pool:
             self.stem.append(nn.MaxPool2d(3, 2, 1))
         self.stages = stages(width)
-        self.head = nn.Linear(8 * width, outputs)
+        self.head: nn.Module = nn.Linear(8 * width, outputs)
         self.coarse = False
         for module in self.modules():
             if isinstance(module, nn.Conv2d) and not module.weight.is_meta:  # else only sizes are wanted

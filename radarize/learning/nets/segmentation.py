@@ -25,6 +25,9 @@ class SegmentationNet(Network):
     the occupancy labels."""
 
     kind, outputs = "segmentation", ("probability",)
+    resampling: Float[Tensor, "azimuth bearing"]
+    scale: Float[Tensor, ""]
+    offset: Float[Tensor, ""]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16):
         super().__init__(frames, maps, width)

@@ -2,9 +2,9 @@
 
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 import torch
@@ -56,6 +56,11 @@ class Header(Frozen):
     metrics: dict[str, float] = {}
     version: str = __version__
 
+    @property
+    def _seen(self) -> Grid:
+        assert self.grid is not None  # who asks has a network that sees maps
+        return self.grid
+
     def windows(self, config: RadarConfig, maker: type[Maker], spacings: Sequence[int] | None = None) -> Windows:
         """Of a radar's frames, as the network was trained on them.
 
@@ -65,34 +70,35 @@ class Header(Frozen):
             spacings: some of the network's; the first if None. The radar's that come nearest are taken, each once.
         """
         chosen = self.spacings[:1] if spacings is None else spacings
-        ratio = self.grid.frame_period / config.frame_period
+        grid = self._seen
+        ratio = grid.frame_period / config.frame_period
         own, centred = Grid.of(config, self.maps[0], maker), maker.axes(config, self.maps[0]).centred
         return Windows(
             self.maps, self.frames, config.frame_period, sorted({max(1, round(ratio * spacing)) for spacing in chosen}),
-            Resampling.between(self.grid, own, centred) if maker.physical else None,
+            Resampling.between(grid, own, centred) if maker.physical else None,
         )  # fmt: skip
 
     def ranges(self, config: RadarConfig) -> Float[np.ndarray, "row"]:
         """Where the rows of a map over range lie that the network sees of a radar, m."""
-        return self.grid.step * np.arange(self.grid.rows) - config.range_bias
+        return self._seen.step * np.arange(self._seen.rows) - config.range_bias
 
     def difference(self, config: RadarConfig, maker: type[Maker]) -> str | None:
         """Why the network cannot be shown a radar's maps, in words; None if it can."""
-        own, period = Grid.of(config, self.maps[0], maker), config.frame_period
+        grid, own, period = self._seen, Grid.of(config, self.maps[0], maker), config.frame_period
         if not maker.physical:
-            share = self.grid.frame_period / period
+            share = grid.frame_period / period
             fits = round(share) >= 1 and abs(share - round(share)) < TOLERANCE * share
-            return self.grid.difference(own, ignore=("frame_period",)) or (
-                None if fits else f"frame period {period:.6g} instead of {self.grid.frame_period:.6g} or a part"
+            return grid.difference(own, ignore=("frame_period",)) or (
+                None if fits else f"frame period {period:.6g} instead of {grid.frame_period:.6g} or a part"
             )
         if (antennas := len(azimuth_row(config))) < LEAST_ANTENNAS:
             return f"{antennas} antennas in a row, expected at least {LEAST_ANTENNAS}"
-        longest = LATEST * max(self.spacings) * self.grid.frame_period
+        longest = LATEST * max(self.spacings) * grid.frame_period
         if self.frames > 1 and period > longest:
             return f"a frame period of {period:.3g} s, expected at most {longest:.3g} s"
-        if period * OFTENEST < self.grid.frame_period:
-            return f"a frame period of {period:.3g} s, expected at least {self.grid.frame_period / OFTENEST:.3g} s"
-        return self.grid.lack(own, "m/s" if maker.axes(config, self.maps[0]).centred else "m")
+        if period * OFTENEST < grid.frame_period:
+            return f"a frame period of {period:.3g} s, expected at least {grid.frame_period / OFTENEST:.3g} s"
+        return grid.lack(own, "m/s" if maker.axes(config, self.maps[0]).centred else "m")
 
 
 #: Bytes of a file's header: ours have some thousands.
@@ -115,6 +121,8 @@ class Network(nn.Module):
         maker: of the maps that it sees.
         scaled: it needs to know how far its maps' rows are apart.
         inputs, outputs: names of what `estimate` takes and gives.
+        shapes: of an item's inputs, of a network that sees no maps.
+        estimate: what the network is used for; its arguments and answers are the subclass's own.
     """
 
     kind: str
@@ -123,21 +131,28 @@ class Network(nn.Module):
     scaled: bool = False
     inputs: tuple[str, ...] = ("maps",)
     outputs: tuple[str, ...] = ("estimate", "covariance")
+    shapes: tuple[tuple[int, ...], ...]
+    estimate: Callable[..., Any]
 
     def __init__(self, frames: int, maps: Sequence[str], width: int):
         super().__init__()
         self.frames, self.maps, self.width = frames, tuple(maps), width
 
 
-def build(network: type[Network], header: Header) -> nn.Module:
+_Net = TypeVar("_Net", bound=Network)
+
+
+def build(network: type[_Net], header: Header) -> _Net:
     """An untrained network as a header describes it.
 
     Raises:
         ValueError: it needs to know the grid, and there is none.
     """
-    if network.scaled and header.grid is None:
-        raise ValueError(f"{header.kind} without a grid")
-    scale = {"step": header.grid.step} if network.scaled else {}
+    scale: dict[str, float] = {}
+    if network.scaled:
+        if header.grid is None:
+            raise ValueError(f"{header.kind} without a grid")
+        scale["step"] = header.grid.step
     return network(header.frames, header.maps, header.width, **scale)
 
 
@@ -156,7 +171,7 @@ def save(net: nn.Module, header: Header, path: Path) -> Path:
     return path
 
 
-def load(path: Path, network: type[Network], config: RadarConfig | None = None) -> tuple[nn.Module, Header]:
+def load(path: Path, network: type[_Net], config: RadarConfig | None = None) -> tuple[_Net, Header]:
     """A network in float32, ready for use.
 
     Args:
@@ -245,7 +260,7 @@ def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "...
             return {name: file.get_tensor(name) for name in (file.keys() if tensors else ())}, about
 
 
-def example(net: nn.Module, header: Header) -> tuple[Tensor, ...]:
+def example(net: Network, header: Header) -> tuple[Tensor, ...]:
     """What a network reads, twice: maps of noise and, if it wants to be told, a travel; or its other readings."""
     noise = torch.Generator().manual_seed(0)
     if header.grid is None:

@@ -95,7 +95,7 @@ class FrameDataset(Dataset):
         recording, maker = self._recording(number)
         frames = slice(first, first + self._reach, self.spacing)
 
-        item = {}
+        item: dict[str, np.ndarray] = {}
         names = tuple(field for field in self.fields if field in MAPS)
         if names:
             item |= maps_of(recording, first, frames.stop, names, maker, self.spacing)

@@ -13,6 +13,7 @@ from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.segmentation import SegmentationNet
+from radarize.learning.nets.weights import Network
 from radarize.learning.task import Motion, Settings, Task, first_cell, turns
 from radarize.signal.maps import Maps
 
@@ -70,11 +71,11 @@ class Rotation(Motion):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         return losses.cyclic(net(maps, label[:, 1:]), label[:, :1])
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
         return self._judged(*net.estimate(maps, label[:, 1:]), label[:, :1])
 
 
-class Segmentation(Task):
+class Segmentation(Task[Tensor]):
     """Occupancy."""
 
     network, truth = SegmentationNet, (OCCUPANCY,)
@@ -92,7 +93,7 @@ class Segmentation(Task):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         return losses.surfaces(net(maps), label)
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
         return self._judged(losses.surfaces(logits, label), logits > 0, label == SURFACE)
 
@@ -107,7 +108,7 @@ class Segmentation(Task):
         loss, near, there = means.tolist()
         return {"loss": loss, "share_found_within_9_cm": near / max(there, 1e-9)}
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """By plain likelihood: multiplied along a bearing, cells' probabilities are that of its first surface."""
         pairs = [(net(maps)[:, :, ::4], label[:, :, ::4]) for maps, label in batches]
         known = [label != UNKNOWN for _, label in pairs]
@@ -124,5 +125,5 @@ class Segmentation(Task):
 
         with torch.enable_grad():
             optimiser.step(closure)
-        net.scale.copy_(fit[0].detach())
-        net.offset.copy_(fit[1].detach())
+        net.get_buffer("scale").copy_(fit[0].detach())
+        net.get_buffer("offset").copy_(fit[1].detach())

@@ -82,12 +82,12 @@ def train(
         raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
     network = task.network
     about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": options.split}
-    if before is not None:
+    if before is not None and options.start is not None:
         about |= {"start": options.start.name, "data": f"{before.data}, then {about['data']}"}
     with team(options.device) as crew:
         lead = crew.rank == 0
         progress, say = (progress, say) if lead else (_nothing, _nothing)
-        parts = _read(task, data, options, settings.seed, progress, before and before.grid)
+        parts = _read(task, data, options, settings.seed, progress, before.grid if before else None)
         trainer = Trainer(task, settings, *parts, crew)
         if begun is not None:
             trainer.net.load_state_dict(begun.state_dict())
@@ -123,7 +123,7 @@ def _words(numbers: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.5g}" for name, value in numbers.items())
 
 
-def _nothing(*where) -> None:
+def _nothing(*where: object) -> None:
     pass
 
 

@@ -20,7 +20,7 @@ from torch.optim.lr_scheduler import ReduceLROnPlateau
 from radarize.io.errors import InputError
 from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets import weights
-from radarize.learning.task import Inputs, Settings, Task
+from radarize.learning.task import Settings, Task
 from radarize.learning.training.team import Team
 
 #: Share of a cosine schedule in which the rate rises.
@@ -41,7 +41,7 @@ class Trainer:
         InputError: too few frames.
     """
 
-    def __init__(self, task: Task, settings: Settings, training: FeatureTable, validation: FeatureTable, team: Team):
+    def __init__(self, task: Task[Any], settings: Settings, training: FeatureTable, validation: FeatureTable, team: Team):
         self.task, self.settings, self.team = task, settings, team
         self.training, self.validation = training.on(team.device), validation.on(team.device)
         self.spacings = task.spacings(training.frame_period)
@@ -57,7 +57,9 @@ class Trainer:
             )
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(settings.seed)
-            self.net = task.net(settings, training.grid).to(team.device, memory_format=torch.channels_last)
+            self.net = task.net(settings, training.grid).to(  # type: ignore[call-overload]  # torch's hints lack memory_format
+                team.device, memory_format=torch.channels_last
+            )
         for module in self.net.modules():
             if hasattr(module, "coarse"):
                 module.coarse = settings.precision == "bfloat16"
@@ -156,7 +158,8 @@ class Trainer:
 
     def _judged(self, rank: int, size: int) -> Float[Tensor, "number"]:
         """Sums of what the task says of validation items, of which each process takes some."""
-        return sum(self.task.judge(self.net, *batch).double().sum(dim=0) for batch in self._validation(rank, size))
+        judged = (self.task.judge(self.net, *batch).double().sum(dim=0) for batch in self._validation(rank, size))
+        return sum(judged, start=torch.zeros(()))
 
     def save(self, path: Path, about: dict) -> None:
         """Write a checkpoint.
@@ -193,8 +196,10 @@ class Trainer:
                 raise InputError(
                     f"{path}: is of a training with {name} {other!r}, expected {value!r}; drop --resume, or it"
                 )
-        progress, best, moments = found["progress"], {}, defaultdict(dict)
-        parts = {"net": {}, "best": best}
+        progress = found["progress"]
+        best: dict[str, Tensor] = {}
+        moments: defaultdict[int, dict[str, Tensor]] = defaultdict(dict)
+        parts: dict[str, dict[str, Tensor]] = {"net": {}, "best": best}
         for name, values in tensors.items():
             group, _, rest = name.partition("/")
             if group == "adam":
@@ -218,13 +223,13 @@ class Trainer:
         seed = np.random.SeedSequence((self.settings.seed, epoch, step, self.team.rank)).generate_state(1, np.uint64)
         return Generator(self.team.device).manual_seed(int(seed[0] >> 1))
 
-    def _items(self, table: FeatureTable, starts: Tensor, spacings: Tensor) -> tuple[Inputs, Tensor]:
+    def _items(self, table: FeatureTable, starts: Tensor, spacings: Tensor) -> tuple[Any, Tensor]:
         inputs, label = self.task.items(table, starts, spacings, self.settings.frames)
         device = self.team.device
         inputs = tuple(each.to(device) for each in inputs) if isinstance(inputs, tuple) else inputs.to(device)
         return inputs, label.to(device)
 
-    def _validation(self, rank: int, size: int) -> Iterator[tuple[Inputs, Tensor]]:
+    def _validation(self, rank: int, size: int) -> Iterator[tuple[Any, Tensor]]:
         mine = self._validated[rank::size]
         spacing = torch.tensor(self.spacings[-1])
         for starts in mine.split(self.settings.batch):

@@ -138,8 +138,8 @@ class Live:
         }
         pictures = self.view.pictures(adc, valid)
         self.page.send("frame", self.view.frame(pictures, stamp) | figures)
-        if self.foxglove and (result := self.view.newest):
-            self.foxglove.pose(stamp, self.view.pose(), result.track.pose[-1])
+        if self.foxglove and (result := self.view.newest) and (pose := self.view.pose()) is not None:
+            self.foxglove.pose(stamp, pose, result.track.pose[-1])
             self.foxglove.scan(stamp, result.ranges[-1])
             for name, pixels in pictures.items():
                 self.foxglove.picture(stamp, name, pixels)
@@ -168,7 +168,8 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
     """Make a pipeline fast from its first frame on: another one runs on noise before, and SLAM, which noise does not
     move, through a room of its own, so that whatever is compiled or loaded at first use is there."""
     torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
-    pipeline, preprocessor, radar = make_pipeline(inputs, **methods), Preprocessor(inputs.signal), inputs.radar
+    pipeline = make_pipeline(inputs, methods["odometry"], methods["scans"])
+    preprocessor, radar = Preprocessor(inputs.signal), inputs.radar
     view, rng = LiveView(pipeline, inputs.signal), np.random.default_rng(0)
     for frames in range(1, TOGETHER + 1):
         adc = rng.integers(-200, 200, (frames, *radar.frame_shape), dtype=np.int16)

@@ -3,6 +3,7 @@
 import contextlib
 import socket
 import time
+from collections.abc import Callable
 
 from radarize.capture.board import CaptureCard, NetworkAddresses
 from radarize.capture.receiver import buffer_warning, enlarge, receive
@@ -76,7 +77,7 @@ class Sensor(FrameStream):
             raise
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._halt(self._uart.stop, self._board.stop)
         super().__exit__()
         self._open.close()
@@ -86,7 +87,7 @@ class Sensor(FrameStream):
         self._halt(self._uart.stop, self._rest, self._board.stop)
         super().stop()
 
-    def _halt(self, *steps) -> None:
+    def _halt(self, *steps: Callable[[], object]) -> None:
         if not self._running:
             return
         self._running = False

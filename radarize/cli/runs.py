@@ -66,7 +66,8 @@ def slam(
     odometry: Annotated[
         Path | None, typer.Argument(metavar="[ODOMETRY]", help="Poses (TUM); else scans alone.")
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")] = ...,
+    *,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
     preset: Annotated[str | None, typer.Option(help="radar (of a RUN), lidar (of a file) or cartographer.")] = None,
     config: Annotated[Path | None, typer.Option(help="Settings that differ from the preset (.yaml).")] = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM), for `radarize evaluate`.")] = None,
@@ -152,6 +153,7 @@ def view(
     ] = None,
 ) -> None:
     """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
+    written: Path | None
     with progress("view") as report:
         if save is not None and save.suffix == ".mcap":
             from radarize.evaluation.mcap import write_mcap

@@ -1,7 +1,7 @@
 """Commands that train networks and compare methods."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -35,7 +35,7 @@ def train(
         Path | None, typer.Option(help="Weights to begin with; recordings may then be of any radars.")
     ] = None,
     settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
-):
+) -> None:
     """Train a network on recordings. What is not given has the default of the task.
 
     On several GPUs: torchrun --nproc-per-node 4 -m radarize.cli train ...
@@ -52,7 +52,7 @@ def train(
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
         "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
-    given = {name: value for name, value in choices.items() if value is not None}
+    given: dict[str, Any] = {name: value for name, value in choices.items() if value is not None}
     task = f"published-{task}" if settings == "published" and not task.startswith("published-") else task
     hyper = replace(find_task(task).defaults, **given)
     with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
@@ -85,7 +85,7 @@ def benchmark(
         list[str] | None, typer.Option(metavar="NAME=FOLDER", help="real: what another program says of the walks.")
     ] = None,
     poses: Annotated[Path | None, typer.Option(help="real: folder of true poses, WALK.tum; else by the lidar.")] = None,
-):
+) -> None:
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
 
@@ -96,6 +96,7 @@ def benchmark(
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
+    assert data is not None and out is not None
     if name in BENCHMARKS and isinstance(own := BENCHMARKS[name], OwnBenchmark):
         given = {"weights": weights, "walks": walks, "poses": poses, "workers": workers, "ray": ray}
         return own.compare(data, out, predictions=predictions or [], **given)

@@ -76,11 +76,12 @@ def evaluate(
     """
     run = run if isinstance(run, RunFolder) else RunFolder(run)
     errors = errors or trajectory_errors(run, reference)
-    metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
+    summaries = {name: item.summary() for name, item in errors.items()}
+    metrics: dict[str, object] = {**summaries}
     metrics["reference"] = Path(reference).name if reference else "reference.tum"
     scans, grid, best = run.scans, run.map, errors["slam"]
     if "trajectory_covariance" in scans:
-        metrics["slam"]["nees"] = pose_nees(best, run.trajectory[0], scans["trajectory_covariance"])
+        summaries["slam"]["nees"] = pose_nees(best, run.trajectory[0], scans["trajectory_covariance"])
     if scans_known := {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
         there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
         metrics["scans"] = scan_errors(scans["ranges"], there)
@@ -91,9 +92,10 @@ def evaluate(
     if "truth/floor_plan" in scans and grid is not None:
         true = true_scans(scans, best) if scans_known else None
         seen = scan_endpoints(*true) if true else None
-        metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
+        figures = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
         if true:
-            metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
+            figures["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
+        metrics["map"] = figures
     if run.blind:
         metrics["blind"] = run.blind.model_dump()
     return without_nan(metrics)

@@ -16,6 +16,7 @@ import sysconfig
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -28,6 +29,11 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.io.replacing import replacing
 from radarize.pipeline.runfolder import RunFolder
+from radarize.pipeline.runfolder.occupancy import OccupancyMap
+
+if TYPE_CHECKING:  # an extra
+    import rerun
+    import rerun.blueprint
 
 _BATCH = 16
 #: Colours of causes in the order of their labels: direct, floor or ceiling, then what is no wall.
@@ -72,7 +78,7 @@ def view(
     return Path(save) if save else None
 
 
-def _open_window(stream) -> None:
+def _open_window(stream: "rerun.RecordingStream") -> None:
     """Start the viewer, which is looked for where this Python's programs are, too."""
     if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
         raise InputError("a window needs a screen, but DISPLAY and WAYLAND_DISPLAY are not set; --save writes a file")
@@ -99,7 +105,7 @@ def opened(source: Path, run: Path | None) -> Iterator[tuple[Recording | None, R
         yield recording, None if run is None else RunFolder(run)
 
 
-def _layout():
+def _layout() -> "rerun.blueprint.Blueprint":
     """What is where in the window."""
     import rerun.blueprint as rrb
 
@@ -125,23 +131,23 @@ class Screen:
         start: stamp of the time line's zero, s.
     """
 
-    def __init__(self, stream):
+    def __init__(self, stream: "rerun.RecordingStream"):
         import rerun
 
         self.rr, self._stream, self.start = rerun, stream, 0.0
         self._styled: set[str] = set()
 
-    def fixed(self, path: str, *things) -> None:
+    def fixed(self, path: str, *things: "rerun.AsComponents") -> None:
         """Something that does not change."""
         self._stream.log(path, *things, static=True)
 
-    def style(self, path: str, thing) -> None:
+    def style(self, path: str, thing: "rerun.AsComponents") -> None:
         """What all rows of a path share; told with the first of them."""
         if path not in self._styled:
             self._styled.add(path)
             self.fixed(path, thing)
 
-    def over_time(self, path: str, times: Float[np.ndarray, "row"], columns) -> None:
+    def over_time(self, path: str, times: Float[np.ndarray, "row"], columns: "rerun.ComponentColumnList") -> None:
         """Something at instants (stamps, s)."""
         clock = self.rr.TimeColumn("time", duration=np.asarray(times) - self.start)
         self._stream.send_columns(path, indexes=[clock], columns=columns)
@@ -155,13 +161,22 @@ class Screen:
         self.over_time(path, times, self.rr.Transform3D.columns(translation=poses[:, :3], quaternion=poses[:, 3:]))
         self.fixed(path, self.rr.TransformAxes3D(axis_length=0.5))
 
-    def points(self, path: str, times, clouds: list[Float[np.ndarray, "point 3"]], color: str) -> None:
+    def points(
+        self, path: str, times: Float[np.ndarray, "row"], clouds: list[Float[np.ndarray, "point 3"]], color: str
+    ) -> None:
         """A cloud of points for every instant, in the frame that the path is in."""
         columns = self.rr.Points3D.columns(positions=np.concatenate(clouds))
         self.over_time(path, times, columns.partition([len(cloud) for cloud in clouds]))
         self.style(path, self.rr.Points3D.from_fields(radii=0.03, colors=_rgb(color)))
 
-    def scans(self, path: str, times, azimuths, ranges: Float[np.ndarray, "row beam"], color: str) -> None:
+    def scans(
+        self,
+        path: str,
+        times: Float[np.ndarray, "row"],
+        azimuths: Float[np.ndarray, "beam"],
+        ranges: Float[np.ndarray, "row beam"],
+        color: str,
+    ) -> None:
         """Ends of the beams that met something."""
         clouds = []
         for row in ranges:
@@ -170,7 +185,14 @@ class Screen:
             clouds.append(np.column_stack([x, y, np.zeros_like(x)]))
         self.points(path, times, clouds, color)
 
-    def pictures(self, path: str, times, images: Shaped[np.ndarray, "row height width *channel"], kind, **more) -> None:
+    def pictures(
+        self,
+        path: str,
+        times: Float[np.ndarray, "row"],
+        images: Shaped[np.ndarray, "row height width *channel"],
+        kind: Any,
+        **more: Any,
+    ) -> None:
         """Images of one format: `kind` is Image (RGB), SegmentationImage or DepthImage; `more` are fields of all."""
         shape, rr = images.shape[1:], self.rr
         model = {"color_model": "RGB"} if len(shape) == 3 else {"color_model": "L"}
@@ -180,7 +202,7 @@ class Screen:
         self.style(path, kind.from_fields(format=form, **more))
         self.over_time(path, times, kind.columns(buffer=[image.tobytes() for image in images]))
 
-    def speeds(self, times, velocity: Float[np.ndarray, "row 2"], who: str) -> None:
+    def speeds(self, times: Float[np.ndarray, "row"], velocity: Float[np.ndarray, "row 2"], who: str) -> None:
         """Velocity forward and left, m/s."""
         for axis, column in zip(("forward", "left"), velocity.T, strict=True):
             known = np.isfinite(column)
@@ -218,7 +240,9 @@ def _send_camera(screen: Screen, recording: Recording) -> None:
     """Where the depth camera is on the radar, and its lens."""
     rr, mount = screen.rr, recording.read("truth/depth_mount")
     fx, fy, cx, cy = map(float, recording.read("truth/depth_intrinsics"))
-    height, width = recording.describe("truth/depth")["shape"][1:]
+    shape = recording.describe("truth/depth")["shape"]
+    assert isinstance(shape, tuple)
+    height, width = shape[1:]
     place = rr.Transform3D(translation=mount[:3], quaternion=rr.Quaternion(xyzw=mount[3:]))
     screen.fixed("world/truth/radar/camera", place)
     lens = rr.Pinhole(
@@ -251,7 +275,8 @@ def _send_frames(screen: Screen, recording: Recording, first: int, last: int, ma
 
 def _rgb(color: str) -> tuple[int, int, int]:
     """From #rrggbb."""
-    return tuple(bytes.fromhex(color[1:]))
+    red, green, blue = bytes.fromhex(color[1:])
+    return red, green, blue
 
 
 def show_run(screen: Screen, run: RunFolder) -> None:
@@ -278,7 +303,7 @@ def show_run(screen: Screen, run: RunFolder) -> None:
         _send_map(screen, run.map)
 
 
-def _send_map(screen: Screen, found) -> None:
+def _send_map(screen: Screen, found: OccupancyMap) -> None:
     """The map as a picture on the floor of SLAM's frame."""
     rr, (height, width) = screen.rr, found.pixels.shape
     x, y, yaw = found.origin

@@ -166,7 +166,8 @@ class Motion(Task[Tensor]):
     size: str
 
     def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
-        return self._judged(*net.estimate(maps), label)
+        mean, covariance = net.estimate(maps)
+        return self._judged(mean, covariance, label)
 
     def _judged(self, mean: Tensor, covariance: Tensor, label: Tensor) -> Tensor:
         found = Gaussian(mean, torch.linalg.cholesky(covariance))

@@ -45,13 +45,16 @@ class SegmentationScans:
         self._net, header = compiled(weights, SegmentationNet, radar)
         self._windows, self.ranges = header.windows(radar, SegmentationNet.maker), header.ranges(radar)
         self.first = first
+        assert header.grid is not None  # the network sees maps
         self._beyond = beyond if radar.max_range > header.grid.reach else None
 
     @torch.inference_mode()
     def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
         """Probability that a cell holds a bearing's first surface, if nothing is before it."""
         shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
-        return self._net.estimate(shown.maps).numpy()
+        likely = self._net.estimate(shown.maps)
+        assert isinstance(likely, torch.Tensor)  # the network's only answer
+        return likely.numpy()
 
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""

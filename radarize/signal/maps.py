@@ -73,6 +73,10 @@ class Maker(ABC):
     history = 0
     physical = False
 
+    @abstractmethod
+    def __init__(self, config: RadarConfig):
+        """For frames of that radar."""
+
     @property
     def names(self) -> tuple[str, ...]:
         """Of all maps."""

@@ -37,7 +37,8 @@ class Pictures(PictureTask):
         columns: that the network answers in.
     """
 
-    network, truth, columns = PictureNet, (Reading("lidar", "truth/lidar"),), COLUMNS
+    network: type[Network] = PictureNet
+    truth, columns = (Reading("lidar", "truth/lidar"),), COLUMNS
     defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
 
     def augment(

@@ -176,6 +176,7 @@ class PublishedStream:
 
     def maps(self, batch: Batch) -> tuple[Int[np.ndarray, "used"], dict[str, Float16[np.ndarray, "used row azimuth"]]]:
         """Which of the next frames are used, and their maps."""
+        assert batch.samples is not None  # the methods are none of pictures
         before = 0 if self._buffer is None else len(self._buffer)
         frames = batch.samples if self._buffer is None else np.concatenate([self._buffer, batch.samples])
         self._buffer = frames[-self._maker.history :].copy()

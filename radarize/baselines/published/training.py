@@ -17,6 +17,7 @@ from radarize.baselines.published.networks import (
 )
 from radarize.learning.features import augment
 from radarize.learning.features.table import YAW, FeatureTable, Reading
+from radarize.learning.nets.weights import Network
 from radarize.learning.task import Motion, Settings, turns
 from radarize.learning.training.tasks import Rotation, Segmentation, Translation
 from radarize.signal.maps import Maps
@@ -27,10 +28,10 @@ class Plain(Motion):
 
     steepest = math.inf
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Keep the validation error as everyone's."""
         squared = torch.cat([(net.estimate(maps)[0] - label).square() for maps, label in batches])
-        net.error.copy_(squared.mean(dim=0).clamp_min(1e-6))
+        net.get_buffer("error").copy_(squared.mean(dim=0).clamp_min(1e-6))
 
 
 class PublishedTranslation(Plain):
@@ -49,7 +50,7 @@ class PublishedTranslation(Plain):
         """Root of the batch's mean squared error, the same for all its items."""
         return (net(maps) - label).square().mean().sqrt().expand(len(maps))
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
         judged = super().judge(net, maps, label)
         judged[:, 0] = judged[:, 1] / label.shape[1]
         return judged
@@ -81,8 +82,9 @@ class PublishedRotation(Plain):
         forth, back = net(torch.cat([maps, maps.flip(1)])).chunk(2)
         return ((label - forth).square() + (-label - back).square()).squeeze(1)
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        judged = self._judged(*net.estimate(maps), label)
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
+        mean, covariance = net.estimate(maps)
+        judged = self._judged(mean, covariance, label)
         judged[:, 0] = self.loss(net, maps, label)
         return judged
 
@@ -102,12 +104,12 @@ class PublishedSegmentation(Segmentation):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         return pooled_dice(net(maps), label).expand(len(maps))
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
         loss = torch.stack([pooled_dice(one[None], truth[None]) for one, truth in zip(logits, label, strict=True)])
         return self._judged(loss, logits.argmax(dim=1) == 1, label == 1)
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Its probabilities are taken as they are."""
 
 

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from radarize.baselines.pictures.training import Pictures, chamfer, unpacked, validated
 from radarize.baselines.radarhd.network import DRAWN, RadarHdPictureNet
 from radarize.baselines.radarhd.training import RadarHd, unlike
+from radarize.learning.nets.weights import Network
 from radarize.learning.task import Settings
 from radarize.signal.maps import Maps
 
@@ -33,18 +34,18 @@ class RadarHdPictures(Pictures):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return known(net(maps), label)
 
-    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+    def judge(self, net: Network, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         logits, label = net(validated(maps)), unpacked(label, DRAWN)
-        found = torch.sigmoid(logits) > net.least
+        found = torch.sigmoid(logits) > net.get_buffer("least")
         return torch.stack([known(logits, label), chamfer(found, label)], dim=1)
 
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Choose the probability from which a cell is a point: the least mean Chamfer distance."""
         total = torch.zeros(len(LEAST))
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label, DRAWN)
             total += torch.stack([chamfer(probability > least, label).sum().cpu() for least in LEAST])
-        net.least.fill_(LEAST[total.argmin()])
+        net.get_buffer("least").fill_(LEAST[total.argmin()])
 
 
 def known(

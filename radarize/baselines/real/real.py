@@ -5,11 +5,11 @@ The data set's measures compare pictures of one number, which are not of one ins
 Both are reported: by number, as published, and by instant.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -123,14 +123,16 @@ def real(
     """
     machine()  # as things are now
     walks = [Walk.find(data, number) for number in options.walks] or Walk.tests(data)
-    total, done, found = sum(walk.frames for walk in walks), {}, {}
+    total = sum(walk.frames for walk in walks)
+    done: dict[str, int] = {}
+    found: dict[str, _Compared] = {}
     jobs = {f"walk {walk.number}": partial(_compare, walk, options) for walk in walks}
     for news in perform(jobs, options.workers, options.ray):
         if news.error is not None:
             raise InputError(news.error)
         if news.ended:
-            found[news.name] = news.result
-            for row in news.result.rows:
+            found[news.name] = compared = cast(_Compared, news.result)
+            for row in compared.rows:
                 figures = (f"{name} {row[name]:.3g}" for name in _SAID if np.isfinite(row.get(name, np.nan)))
                 say(f"{news.name}, {row['method']}: {', '.join(figures)}")
         else:
@@ -176,7 +178,7 @@ def _compare(walk: Walk, options: RealOptions, report: Report) -> _Compared:
     told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
     moved = {name: clocked_turn_errors(each, poses, clock) for name, each in told.items()}
     maps, rows = _maps(walk, judged, poses, rates, lambda share: report(walk.frames * (1 + share) / 2)), []
-    mapped_by = {row["method"]: row for row in maps}
+    mapped_by = {str(row["method"]): row for row in maps}
     for name in dict.fromkeys([*judged.apart, *moved, *mapped_by]):
         about = {"walk": walk.number, "part": walk.folder.name, "method": name}
         row = about | _row(judged.apart.get(name, [])) | moved.get(name, {})
@@ -238,7 +240,7 @@ def _row(found: Sequence[Distances]) -> dict[str, float]:
     }
 
 
-def _median(values: Sequence[float]) -> float:
+def _median(values: Iterable[float]) -> float:
     """Of those that are numbers."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.median(known)) if known else np.nan

@@ -77,7 +77,8 @@ class Rnin(Motion):
         return displaced(mean, label) + likelihood.sum(dim=2).mean(dim=1)
 
     def judge(self, net: Network, windows: Tensor, label: Tensor) -> Tensor:
-        judged = self._judged(*net.estimate(windows), label[:, -1, :2])
+        mean, covariance = net.estimate(windows)
+        judged = self._judged(mean, covariance, label[:, -1, :2])
         judged[:, 0] = displaced(net(windows)[0], label)
         return judged
 

@@ -57,6 +57,7 @@ class ScanMatching:
         centers = batch.centers
         steps = intervals(centers, self._time)
         ranges = batch.ranges
+        assert ranges is not None  # the pipeline extracts scans first
         turning = np.full((len(centers), 2), np.nan) if self.rates is None else self.rates(batch)
         moved, seen = np.zeros((len(centers), 3)), np.zeros(len(centers), bool)
         poses, rates, spreads = moved.copy(), moved.copy(), np.zeros((len(centers), 3, 3))

@@ -25,7 +25,7 @@ def import_walk(
     data: Path,
     number: int,
     output: Path,
-    products: dict[str, Product],
+    products: Mapping[str, Product],
     progress: Callable[[int, int], None] = lambda done, total: None,
     *,
     align: bool = False,
@@ -62,13 +62,14 @@ def import_walk(
     if "truth/pose" not in products:
         about["found"] = "no poses were given: they are by SLAM with the lidar's scans"
         poses = planar_poses(lidar_poses(walk, lambda done, _: progress(walk.frames + done, total)))
-        products = products | {
+        products = {
+            **products,
             "truth/time": Product(times, "s", "of poses"),
             "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the lidar's map"),
         }
     if align:
         known = products["truth/time"]
-        products = products | {"truth/time": replace(known, data=PERIOD * clock.radar(known.data / PERIOD))}
+        products = {**products, "truth/time": replace(known, data=PERIOD * clock.radar(known.data / PERIOD))}
     streams = {
         polar.PICTURE: Stream((polar.ROWS, polar.COLUMNS), "u1", "", "RadarHD's picture of one loop, 0...255"),
         "truth/scan": Stream((polar.BEAMS,), "f4", "m", "range of the lidar's first point, inf where it has none"),

@@ -268,7 +268,7 @@ REVERSED: Seeds = {
 #: RadarHD's training walks, one by one and all together.
 #: RadarHD's training walks.
 TRAINING = (*range(112, 117), *range(118, 124), *range(125, 132), *range(133, 139), 140)
-PICTURES: Seeds = {NamedWalk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
+PICTURES: Seeds = {**{NamedWalk.radarhd(number).scene: (None,) for number in TRAINING}, "RadarHD, train": (None,)}
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),

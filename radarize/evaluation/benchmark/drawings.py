@@ -32,6 +32,7 @@ def draw(
         for run in found:
             folders.setdefault(run.case.name, {})[method] = RunFolder(study.output / run.place)
             result = study.results[run]
+            assert isinstance(result, dict)  # `Study.of` has runs that ended well
             errors[method][run.case.name] = result["quantiles"][which], result[which]["ate"]["position"]["mean"]
     for part in parts.split():
         if part == "trajectories":

@@ -42,6 +42,7 @@ class FrameErrors:
             InputError: a damaged file.
         """
         folder = RunFolder(run)
+        assert folder.odometry is not None and folder.claims is not None  # every method of odometry leaves both
         scans, (times, poses) = folder.scans, folder.odometry
         return cls(
             scans["velocity"],
@@ -62,6 +63,7 @@ class FrameErrors:
 
 def true_poses(run: RunFolder) -> Pose:
     """True poses of a run's frames: truth has one for every frame, a run one for every frame that was not lost."""
+    assert run.odometry is not None  # whose poses are judged
     true, true_times, times = planar(run.scans["truth/pose"]), run.scans["truth/time"], run.odometry[0]
     return true if len(times) == len(true) else true[np.abs(true_times[:, None] - times).argmin(axis=0)]
 

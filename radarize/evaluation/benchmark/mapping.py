@@ -36,7 +36,8 @@ NOTES = (
 def tables(study: Study) -> list[Table]:
     """Figures by platform, by building and of all."""
     notes = [f"Means over recordings; odometry: {study.chosen.partner.odometry}.", *NOTES]
-    paths, factors = ({name: each[k] for name, each in COLUMNS.items()} for k in (0, 1))
+    paths = {name: path for name, (path, _) in COLUMNS.items()}
+    factors = {name: factor for name, (_, factor) in COLUMNS.items()}
     rows = [
         {"scans": pair.scans, **group, **(figures_of(runs, paths).mean() * pd.Series(factors))}
         for pair, group, runs in study.by_group()

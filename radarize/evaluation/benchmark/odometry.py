@@ -8,6 +8,7 @@ import pandas as pd
 
 from radarize.evaluation.benchmark.followed import FrameErrors, joined, turn_nees, turned
 from radarize.evaluation.benchmark.protocol import figures_of
+from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Study
 from radarize.evaluation.benchmark.table import Table, with_median
 from radarize.evaluation.benchmark.trajectories import trajectory_tables
@@ -17,13 +18,13 @@ from radarize.evaluation.motion import velocity_errors
 #: s: span that the paper's network tells a turn over.
 WINDOW = 4 / 15
 #: The paper's tables 2 and 3: ATE in m and rad, RE between frames in m.
-PAPER = {
+PAPER: dict[str, tuple[float, ...]] = {
     "milliego": (4.100, 1.054, 0.059),
     "rnin": (2.993, 0.542, 0.018),
     "learned": (0.805, 0.366, 0.014),
     "fused": (0.805, 0.366, 0.014),
 }
-PAPER_PLATFORMS = {
+PAPER_PLATFORMS: dict[str, tuple[float, ...]] = {
     "milliego": (3.977, 0.817, 0.050),
     "rnin": (5.122, 1.927, 0.019),
     "learned": (1.121, 0.565, 0.013),
@@ -58,7 +59,7 @@ CLAIMS = (
 def tables(study: Study, paper: dict[str, tuple[float, ...]] = PAPER) -> list[Table]:
     """Trajectories by each protocol; figures of all frames, by platform and building."""
     known = {pair: paper[pair.odometry] for pair in study.pairs if pair.odometry in paper}
-    labels = {pair: {"odometry": pair.odometry} for pair in study.pairs}
+    labels: dict[Pair, dict[str, object]] = {pair: {"odometry": pair.odometry} for pair in study.pairs}
     return [*trajectory_tables(study, "odometry", labels, known, "Odometry"), steps_table(study)]
 
 

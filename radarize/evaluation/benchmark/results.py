@@ -139,9 +139,12 @@ def commit(source: Path) -> str:
     root = source.parent
     if not git("ls-files", "--error-unmatch", source.name):  # installed, perhaps below another project's checkout
         return "not a checkout"
-    root = Path(git("rev-parse", "--show-toplevel"))
-    changed = git("status", "--porcelain", "--", ":!benchmarks/results", ":!docs", ":!*.md").splitlines()
-    state = f"{len(changed)} files changed since" if changed else "clean"
+    top = git("rev-parse", "--show-toplevel")
+    assert top is not None  # git has just answered
+    root = Path(top)
+    changed = git("status", "--porcelain", "--", ":!benchmarks/results", ":!docs", ":!*.md")
+    assert changed is not None
+    state = f"{len(changed.splitlines())} files changed since" if changed else "clean"
     return f"{git('rev-parse', '--short', 'HEAD')} ({state})"
 
 

@@ -3,11 +3,11 @@
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Chosen, Study
 from radarize.evaluation.benchmark.table import PAPER, Table
-from radarize.evaluation.benchmark.trajectories import beside, split_rows, trajectory_tables
+from radarize.evaluation.benchmark.trajectories import Figures, beside, split_rows, trajectory_tables
 from radarize.pipeline.methods import BEST
 
 #: The paper's combinations: ATE in m and rad, RE between frames in m. RadarHD alone is scan matching on its scans.
-COMBINATIONS = {
+COMBINATIONS: Figures = {
     Pair("scan-matching", "radarhd"): (4.833, 0.751, 0.045),
     Pair("milliego", "radarhd"): (3.900, 0.808, 0.022),
     Pair("rnin", "radarhd"): (3.299, 0.541, 0.020),
@@ -28,7 +28,9 @@ def pairs(chosen: Chosen) -> list[Pair]:
 
 def tables(study: Study) -> list[Table]:
     """SLAM's trajectories by each protocol."""
-    label = {pair: {"odometry": pair.odometry, "scans": pair.scans} for pair in study.pairs}
+    label: dict[Pair, dict[str, object]] = {
+        pair: {"odometry": pair.odometry, "scans": pair.scans} for pair in study.pairs
+    }
     return trajectory_tables(study, "slam", label, COMBINATIONS, "SLAM")
 
 

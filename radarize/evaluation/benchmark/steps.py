@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, cast
 
 from radarize.io import jobs
 from radarize.io.errors import InputError
@@ -28,9 +28,14 @@ class Step(Protocol):
         place: its folder in the output's.
     """
 
-    frames: int
-    alone: bool
-    place: str
+    @property
+    def frames(self) -> int: ...
+
+    @property
+    def alone(self) -> bool: ...
+
+    @property
+    def place(self) -> str: ...
 
     def identity(self) -> dict[str, object]:
         """All that what it finds depends on, as JSON has it."""
@@ -74,7 +79,8 @@ def perform(
         What each step found, or the sentence why it could not be done.
     """
     steps = list(dict.fromkeys(steps))
-    total, results = sum(step.frames for step in steps), {}
+    total = sum(step.frames for step in steps)
+    results: dict[Step, dict[str, object] | str] = {}
     done: dict[str, float] = {}  # frames
 
     def report(step: Step, share: float) -> None:
@@ -92,12 +98,15 @@ def perform(
                 report(step, 1.0)
         work = {name: partial(_do, step, output) for name, step in todo.items()}
         if ray is None and (alone or workers == 1):
-            heard = (jobs.attempt(name, job, partial(report, todo[name])) for name, job in work.items())
+            heard: Iterator[jobs.News] = (
+                jobs.attempt(name, job, partial(report, todo[name])) for name, job in work.items()
+            )
         else:
             heard = jobs.perform(work, workers, ray, alone)
         for news in heard:
             if news.ended:
-                results[todo[news.name]] = news.result or news.error
+                # What `_do` returned, or why it could not be done.
+                results[todo[news.name]] = cast(dict[str, object] | str, news.result or news.error)
             report(todo[news.name], 1.0 if news.ended else news.done)
     return results
 

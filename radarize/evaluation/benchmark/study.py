@@ -1,6 +1,6 @@
 """A comparison of methods: what it is (`Benchmark`), and how it goes on a data set (`Study`)."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from radarize.evaluation.benchmark.table import Table
 from radarize.evaluation.report.page import Page
 from radarize.io.errors import InputError
 from radarize.io.plugins import Plugins
+from radarize.pipeline.method import Method
 from radarize.pipeline.methods import BEST, ODOMETRY, SCANS, best_methods
 
 
@@ -92,11 +93,12 @@ class Chosen:
     def of(cls, options: Options, data: DataSet) -> "Chosen":
         """Methods of choice are those without networks where the shipped ones do not fit the radar."""
         partner = best_methods(data.cases[0].config)[0] if options.shipped else BEST
-        compared = []
-        for known in (ODOMETRY, SCANS):
+
+        def compared(known: Mapping[str, Method]) -> tuple[str, ...]:
             named = [name for name in options.methods if name in known]
-            compared.append(tuple(named or (name for name, method in known.items() if not method.pictures)))
-        return cls(*compared, Pair(**partner))
+            return tuple(named or (name for name, method in known.items() if not method.pictures))
+
+        return cls(compared(ODOMETRY), compared(SCANS), Pair(**partner))
 
 
 @dataclass(frozen=True)
@@ -288,7 +290,7 @@ class Study:
         for training in self.trainings:
             if isinstance(reason := self.results.get(training), str):
                 found.append(f"{training.split}: {self._plain(reason)}.")
-        steps = dict.fromkeys(step for step in self.steps if not isinstance(step, Training))
+        steps = dict.fromkeys(step for step in self.steps if isinstance(step, RunStep | Timing))
         for pair in self.pairs:
             of_pair = [self.results.get(step) for step in steps if step.pair == pair]
             reasons = [self._plain(found) for found in of_pair if isinstance(found, str)]

@@ -6,6 +6,7 @@ Runs are folders by recording and method; `colors` has one for each method.
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from evo.core.trajectory import PoseTrajectory3D
 
 from radarize.evaluation.evaluate import trajectories
 from radarize.evaluation.report.drawings import canvas
@@ -19,6 +20,11 @@ _POSES, _ERRORS = 240, 200
 Runs = Mapping[str, Mapping[str, RunFolder]]
 
 
+def _truth(run: RunFolder) -> PoseTrajectory3D:
+    assert run.reference is not None  # what is compared has been judged by it
+    return trajectory(*run.reference)
+
+
 def draw_trajectories(page: Page, runs: Runs, colors: Mapping[str, str], which: str) -> None:
     """Trajectories (``odometry`` or ``slam``) from above, laid upon the truth, of one recording at a time."""
     page.section(
@@ -27,7 +33,7 @@ def draw_trajectories(page: Page, runs: Runs, colors: Mapping[str, str], which: 
     )
     figure, owners = from_above(), []
     for recording, folders in runs.items():
-        truth = trajectory(*next(iter(folders.values())).reference)
+        truth = _truth(next(iter(folders.values())))
         paths = {method: trajectories(folder)[which] for method, folder in folders.items()}
         paths = {method: moved(path, *fitted(path, truth)) for method, path in paths.items()}
         for method, path in {"truth": truth, **paths}.items():
@@ -80,7 +86,7 @@ def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
     )
     for recording, folders in runs.items():
         first = next(iter(folders.values()))
-        plan, truth = first.scans.get("truth/floor_plan"), trajectory(*first.reference)
+        plan, truth = first.scans.get("truth/floor_plan"), _truth(first)
         path = truth.positions_xyz[:, :2]
         columns = min(1 + len(folders), 4)
         figure, axes = canvas(columns, -(-(1 + len(folders)) // columns), height=3.0)
@@ -94,6 +100,7 @@ def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
                 axis.plot(*walls(plan).T, color=INK, lw=0.4 if method else 0.8, alpha=0.9)
             if method:
                 grid = folders[method].map
+                assert grid is not None  # `radarize run` makes one
                 turn, shift = fitted(trajectory(*folders[method].trajectory), truth)
                 cells = grid.centers(grid.occupied) @ turn[:2, :2].T + shift[:2]
                 axis.plot(*cells.T, ",", color=colors[method])

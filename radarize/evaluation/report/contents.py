@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ DERIVED = {
 }
 
 
-def contents(path: Path) -> dict[str, object]:
+def contents(path: Path) -> dict[str, Any]:
     """Everything about a recording but its samples, as JSON-ready data.
 
     Returns:

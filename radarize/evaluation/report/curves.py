@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from radarize.evaluation.report.drawings import canvas
 from radarize.evaluation.stress import FIGURES
@@ -15,7 +16,7 @@ def curves(
     panel: str = "stress",
     line: str = "scans",
     names: Sequence[str] = ("ghosts", "missed", "map_f1", "odometry"),
-):
+) -> Figure:
     """Figures over what was varied: a row of axes for each figure, a column for each panel, means where rows are alike.
 
     Args:

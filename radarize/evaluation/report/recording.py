@@ -1,8 +1,10 @@
 """What a recording holds, real or simulated, as far as its antennas allow, as a page."""
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+import torch
 from jaxtyping import Int
 from scipy.signal import find_peaks
 
@@ -67,13 +69,13 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
             _trajectory(page, recording)
     page.section("What is in it")
     page.table(*data_sets(found))
-    config = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
-    config["board"] = str(recording.config.board)
-    page.columns({"configuration (SI units)": config, "derived": found["derived"], "attributes": found["attributes"]})
+    fields = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
+    fields["board"] = str(recording.config.board)
+    page.columns({"configuration (SI units)": fields, "derived": found["derived"], "attributes": found["attributes"]})
     return page.write(output)
 
 
-def _batches(recording: Recording, count: int):
+def _batches(recording: Recording, count: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Frames spread over the recording, one at a time, as (index, samples, valid)."""
     for index in np.unique(np.linspace(0, len(recording) - 1, count).astype(int)):
         yield index, recording.adc(index, index + 1), recording.valid(index, index + 1)
@@ -116,13 +118,15 @@ def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
         about += f", and {len(maps.pairs)} vertical pairs that weaken ceiling and floor"
     page.section("Azimuth", about + ". From above: forward is up, left is left. dB below the strongest cell.")
     for index, adc, valid in _batches(recording, _FRAMES):
-        fans = {"range-azimuth": maps.range_azimuth}
+        fans: dict[str, Callable[[np.ndarray, np.ndarray], torch.Tensor]] = {"range-azimuth": maps.range_azimuth}
         if maps.pairs is not None:
             fans["elevation aware"] = maps.elevation_aware
         figure, axes = canvas(len(fans) + 1)
         for axis, (title, make) in zip(axes[0], fans.items(), strict=False):
             draw_fan(axis, make(adc, valid)[0].numpy(), maps.ranges, maps.azimuths, title)
-        known = recording.rows("truth/velocity", index, index + 1) if recording.has("truth/velocity") else ()
+        known = (
+            recording.rows("truth/velocity", index, index + 1) if recording.has("truth/velocity") else np.empty((0, 2))
+        )
         velocity = known[0, :2] if len(known) else None
         speeds = maps.doppler_azimuth(adc, valid)[0].numpy()
         draw_doppler(axes[0, -1], speeds, maps.velocities, maps.azimuths, "Doppler-azimuth", velocity)

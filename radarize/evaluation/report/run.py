@@ -40,10 +40,10 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     for sentence in folder.warnings:
         page.text(f"Warning: {sentence}.")
     if blind:
-        sentence, spans = words.blindness(blind)
+        sentence, table = words.blindness(blind)
         page.text(sentence)
-        if spans.rows and not folder.health:  # of a version that gave no advice
-            page.table(*spans, sortable=True)
+        if table.rows and not folder.health:  # of a version that gave no advice
+            page.table(*table, sortable=True)
     if folder.health:
         page.table(*words.health(folder.health), sortable=True)
     if errors and others:
@@ -90,7 +90,9 @@ def _result(page: Page, metrics: dict) -> None:
     page.section("Result")
     page.headline(cards)
     page.table(*words.trajectories(metrics))
-    page.columns({table.head[0]: dict(table.rows) for table in words.parts(metrics)}, numbers=(1,))
+    page.columns(
+        {table.head[0]: {row[0]: row[1] for row in table.rows} for table in words.parts(metrics)}, numbers=(1,)
+    )
 
 
 def _plan(page: Page, run: RunFolder, errors: dict[str, TrajectoryErrors], beside: Sequence[RunFolder]) -> None:

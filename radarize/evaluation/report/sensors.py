@@ -1,6 +1,7 @@
 """Pictures of what sensors beside the radar recorded, for the page of a recording."""
 
 import numpy as np
+from jaxtyping import Int
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from scipy.spatial.transform import Rotation
@@ -13,7 +14,7 @@ from radarize.io.recording import Recording
 _NONE = 255
 
 
-def show_sensors(page: Page, recording: Recording, frames: list[int]) -> None:
+def show_sensors(page: Page, recording: Recording, frames: Int[np.ndarray, "frame"]) -> None:
     """Sections for whatever there is of pictures at some frames, IMU and tracking camera."""
     drawers = {
         "truth/depth": ("Depth camera", "Nearer is darker; white has no value.", _depth),

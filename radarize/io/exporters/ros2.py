@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.io.errors import InputError
-from radarize.io.exporters.bagwriter import BagWriter, header, message, vector
+from radarize.io.exporters.bagwriter import BagWriter, Message, header, message, vector
 from radarize.io.pose import OPTICAL_TURN, between
 from radarize.io.recording import Recording
 from radarize.io.tum import planar_poses
@@ -237,12 +237,13 @@ def _camera_info(about: object, width: int, height: int, pinhole: Float[np.ndarr
 def _inertial(recording: Recording) -> Iterator[Event]:
     if not recording.has("imu/time"):
         return
+    level = vector(np.array([0, 0, 0, 1]), "Quaternion")
     unknown = np.array([-1.0, *[0] * 8])  # no orientation: sensor_msgs/Imu
     for k in range(len(recording)):
         columns = (recording.rows(f"imu/{name}", k, k + 1) for name in ("time", "accelerometer", "gyroscope"))
         for time, force, turn in zip(*columns, strict=True):
             yield time, "/imu", message(
-                "sensor_msgs/msg/Imu", header=header(time, "imu"), orientation=vector(np.array([0, 0, 0, 1]), "Quaternion"),
+                "sensor_msgs/msg/Imu", header=header(time, "imu"), orientation=level,
                 orientation_covariance=unknown, angular_velocity=vector(turn), angular_velocity_covariance=np.zeros(9),
                 linear_acceleration=vector(force), linear_acceleration_covariance=np.zeros(9),
             )  # fmt: skip

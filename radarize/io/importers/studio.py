@@ -1,5 +1,6 @@
 """Captures of mmWave Studio: ``.bin`` with ``NAME.mmwave.json`` and ``NAME.setup.json`` beside it."""
 
+from collections.abc import Sequence
 from pathlib import Path, PureWindowsPath
 
 from radarize.io.errors import InputError

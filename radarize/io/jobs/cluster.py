@@ -6,6 +6,8 @@ import socket
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from radarize.io.errors import InputError, explained, first_line
 from radarize.io.jobs.job import Job, News, Report, attempt
@@ -48,7 +50,7 @@ class _Order:
         return self.job(report)
 
 
-def _do(order: _Order, board) -> News:
+def _do(order: _Order, board: Any) -> News:  # what Ray makes of a `_Board`
     return attempt(order.name, order, lambda done: board.put.remote(order.name, done))
 
 
@@ -79,14 +81,14 @@ def perform(jobs: Mapping[str, Job], address: str, alone: bool) -> Iterator[News
         ray.kill(board)
 
 
-def _largest_node(ray) -> dict[str, float]:
+def _largest_node(ray: ModuleType) -> dict[str, float]:
     """Cores and GPUs of the node that has most."""
     nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
     gpus, cpus = max((node.get("GPU", 0), node.get("CPU", 1)) for node in nodes)
     return {"num_cpus": cpus, "num_gpus": gpus}
 
 
-def _connect(address: str):
+def _connect(address: str) -> ModuleType:
     import ray
 
     _knock(address)

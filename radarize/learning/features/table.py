@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import psutil
@@ -17,6 +18,9 @@ from radarize.io.recording import Recording
 from radarize.io.tum import planar
 from radarize.learning.features.grid import Grid, Resampling
 from radarize.signal.maps import Maker, MapMaker, maps_of
+
+#: Maps, and all else, of one recording, by name.
+_Read = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,7 @@ class FeatureTable:
         for news in heard:
             if news.error is not None:
                 raise news.failure
-            made, others[news.name] = news.result
+            made, others[news.name] = cast(_Read, news.result)
             for name in maps:
                 joined[name][places[news.name]] = made[name]
             progress("reading", len(others), len(paths))
@@ -166,9 +170,12 @@ class FeatureTable:
         frame = sum(self.lengths[:count])
 
         def part(frames: slice, lengths: Sequence[int]) -> FeatureTable:
-            columns = ("maps", "truth", "sensed")
-            some = {what: {name: rows[frames] for name, rows in getattr(self, what).items()} for what in columns}
-            return replace(self, lengths=lengths, **some)
+            def some(columns: dict[str, Tensor]) -> dict[str, Tensor]:
+                return {name: rows[frames] for name, rows in columns.items()}
+
+            return replace(
+                self, lengths=lengths, maps=some(self.maps), truth=some(self.truth), sensed=some(self.sensed)
+            )
 
         return part(slice(frame), self.lengths[:count]), part(slice(frame, None), self.lengths[count:])
 
@@ -191,15 +198,17 @@ def _open(path: Path, maps: Sequence[str], maker: type[Maker], grid: Grid | None
 
 def _read(
     path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], grid: Grid | None, _: Report
-) -> tuple[dict, dict]:
+) -> _Read:
     """Maps, and all else, of one recording, on a grid if there is one."""
     with Recording(path) as recording:
         maker, count = kind(recording.config), len(recording)
         stride = maker.stride(recording.config)
         size = _BATCH * stride
         starts = range(0, count if maps else 0, size)
-        own = {} if grid is None else {name: Grid.of(recording.config, name, kind) for name in maps}
-        bring = {n: Resampling.between(grid, g, kind.axes(recording.config, n).centred) for n, g in own.items()}
+        own, bring = {}, {}
+        if grid is not None:
+            own = {name: Grid.of(recording.config, name, kind) for name in maps}
+            bring = {n: Resampling.between(grid, g, kind.axes(recording.config, n).centred) for n, g in own.items()}
         parts = []
         for start in starts:
             made = maps_of(recording, start, min(start + size, count), maps, maker, stride)

@@ -72,14 +72,16 @@ class Rotation(Motion):
         return losses.cyclic(net(maps, label[:, 1:]), label[:, :1])
 
     def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
-        return self._judged(*net.estimate(maps, label[:, 1:]), label[:, :1])
+        mean, covariance = net.estimate(maps, label[:, 1:])
+        return self._judged(mean, covariance, label[:, :1])
 
 
 class Segmentation(Task[Tensor]):
     """Occupancy."""
 
-    network, truth = SegmentationNet, (OCCUPANCY,)
-    maps = ("range_azimuth", "elevation_aware")
+    network: type[Network] = SegmentationNet
+    truth = (OCCUPANCY,)
+    maps: tuple[str, ...] = ("range_azimuth", "elevation_aware")
     defaults = Settings(frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
     #: Cells of range by which a first surface may be off to count as found: 9 cm.
     near = 2

@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -41,7 +42,9 @@ class Trainer:
         InputError: too few frames.
     """
 
-    def __init__(self, task: Task[Any], settings: Settings, training: FeatureTable, validation: FeatureTable, team: Team):
+    def __init__(
+        self, task: Task[Any], settings: Settings, training: FeatureTable, validation: FeatureTable, team: Team
+    ):
         self.task, self.settings, self.team = task, settings, team
         self.training, self.validation = training.on(team.device), validation.on(team.device)
         self.spacings = task.spacings(training.frame_period)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -158,9 +158,9 @@ def real(
 class _Compared(NamedTuple):
     """What comes of a walk: rows of the tables, and how far each method's points are off, by walk and method."""
 
-    rows: list[dict[str, object]]
+    rows: list[dict[str, Any]]
     clock: dict[str, float]
-    maps: list[dict[str, object]]
+    maps: list[dict[str, Any]]
     apart: dict[tuple[int, str], list[Distances]]
 
 

@@ -3,7 +3,7 @@ whatever ends a comparison, the same command goes on after the last step that en
 """
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import groupby
 from pathlib import Path

@@ -131,7 +131,7 @@ def _odometry_message(
     pose: Float[np.ndarray, "7"],
     twist: Float[np.ndarray, "6"],
     spread: Float[np.ndarray, "3 3"],
-) -> object:
+) -> Message:
     covariance = np.zeros((6, 6))
     covariance[np.ix_([0, 1, 5], [0, 1, 5])] = spread
     place = message(
@@ -145,7 +145,7 @@ def _odometry_message(
     )  # fmt: skip
 
 
-def _transform(time: float, frame: str, child: str, pose: Float[np.ndarray, "7"]) -> object:
+def _transform(time: float, frame: str, child: str, pose: Float[np.ndarray, "7"]) -> Message:
     place = {"translation": vector(pose[:3]), "rotation": vector(pose[3:], "Quaternion")}
     motion = message("geometry_msgs/msg/Transform", **place)
     stamp = header(time, frame)
@@ -184,7 +184,7 @@ def _points(recording: Recording) -> Iterator[Event]:
         yield time, "/radar/points", _cloud(time, cloud[None], COLUMNS)
 
 
-def _cloud(time: float, cells: Float[np.ndarray, "row column field"], names: tuple[str, ...]) -> object:
+def _cloud(time: float, cells: Float[np.ndarray, "row column field"], names: tuple[str, ...]) -> Message:
     fields = [
         message("sensor_msgs/msg/PointField", name=name, offset=4 * k, datatype=_FLOAT32, count=1)
         for k, name in enumerate(names)
@@ -224,7 +224,7 @@ def _depth(recording: Recording) -> Iterator[Event]:
             yield time, "/camera/depth/camera_info", _camera_info(about, width, height, pinhole)
 
 
-def _camera_info(about: object, width: int, height: int, pinhole: Float[np.ndarray, "4"]) -> object:
+def _camera_info(about: Message, width: int, height: int, pinhole: Float[np.ndarray, "4"]) -> Message:
     fx, fy, cx, cy = map(float, pinhole)
     region = message("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
     return message(

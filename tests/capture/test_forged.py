@@ -98,3 +98,10 @@ def test_a_capture_of_a_few_packets_is_whole():
     frames = [frame for packet in few for frame in small.take(("board", 1024), packet.encode())] + list(small.finish())
     assert len(frames) == 1 and frames[0][1].all()
     assert list(origin.finish()) == []
+
+
+def test_damaged_packets_alone_end_without_a_frame():
+    origin = Origin("board", SMALL)
+    assert not list(origin.take(("board", 4098), b"\x00"))
+    assert not list(origin.finish())
+    assert origin.look().packets == 1 and origin.look().received == 0

@@ -93,7 +93,7 @@ def test_the_wheel_holds_what_the_repository_does(wheel):
     }
     boards = {f"radarize/radar/boards/{name}.yaml" for name in BOARDS}
     pages = {"radarize/capture/live.html", "radarize/evaluation/report/templates/page.html"}
-    types = {f"{package}/{name}" for package in ("radarize", "radarsim") for name in ("__init__.pyi", "py.typed")}
+    types = {f"{package}/{name}" for package in ("radarize", "radarsim") for name in ("__init__.py", "py.typed")}
     assert found >= scenes | weights | boards | pages | types
     assert {name.split("/")[0] for name in found} == {"radarize", "radarsim", f"radarize-{__version__}.dist-info"}
     assert wheel.stat().st_size < 20e6

@@ -31,7 +31,7 @@ from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.gaussian import Gaussian
-from radarize.odometry.localmap import LocalMap, MapView
+from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
 from radarize.odometry.ties import wandered
 from radarize.signal.batch import Batch
@@ -190,7 +190,7 @@ class MapRotation:
         turns = []
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
         for i, (feature, echoes) in enumerate(shown):
-            view = MapView(feature, self._ranges, self._bearing_sines)
+            view = View(feature, self._ranges, self._bearing_sines)
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
             if self._time is None:
@@ -210,7 +210,7 @@ class MapRotation:
 
     def _turn(
         self,
-        view: MapView,
+        view: View,
         time: float,
         dt: float,
         velocity: Float[np.ndarray, "2"],
@@ -254,7 +254,7 @@ class MapRotation:
             state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
             state.covariance[YAW, YAW] = known + np.pi**2
 
-    def _join(self, view: MapView, share: float) -> None:
+    def _join(self, view: View, share: float) -> None:
         """A frame joins the map, which then lies as far wrong as its frames do on average."""
         self._position = self._map.follow(self._position)
         self._map.blend(view, self._position, self._laid, share)
@@ -262,7 +262,7 @@ class MapRotation:
         self._state.replace(_MAP, self._state.row({YAW: share, _MAP: 1 - share}))
         self._state.mean[_MAP] = lies  # where the frame was laid is no news
 
-    def _match(self, view: MapView) -> bool:
+    def _match(self, view: View) -> bool:
         """Correct the filter by how the frame lies in the map, and say whether that is known."""
         for flash in self._bearings.flashes:  # no landmarks: they slide along walls as the sensor does
             view.feature[np.abs(self._ranges - flash) < _RING] = 0.0
@@ -287,7 +287,7 @@ class MapRotation:
         both ends."""
         return compose(self._start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._way)[..., :2]
 
-    def _fit(self, view: MapView, spread: float) -> tuple[float, float]:
+    def _fit(self, view: View, spread: float) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
         none."""
         s = self.settings

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from radarize.io.errors import InputError
-from radarize.learning.features.grid import Grid, Resampling
+from radarize.learning.features.grid import MapGrid, Resampling
 from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.weights import Header, build, example, load, save
 from radarize.odometry.doppler import Velocities
@@ -30,7 +30,7 @@ def weights(folder, kind: str, **about):
     """An untrained network for frames at half the preset's rate."""
     maps = MAPS[kind]
     fields = {"spacings": (1, 2, 3, 4)} if kind == "rotation" else {}
-    header = Header(kind=kind, frames=2, maps=maps, width=2, grid=Grid.of(SLOW, maps[0]), **(fields | about))
+    header = Header(kind=kind, frames=2, maps=maps, width=2, grid=MapGrid.of(SLOW, maps[0]), **(fields | about))
     torch.manual_seed(0)
     net = build(NETS[kind], header)
     net(*example(net, header))
@@ -85,7 +85,7 @@ def test_maps_of_other_chirps_are_shown_on_the_known_grid(tmp_path):
     made = signal.maker.of(noise, MAPS["translation"])
     (shown,) = header.windows(fine, MapMaker).push(made, fine.frame_period * np.arange(3))
     assert shown.maps.shape == (3, 2, 2, CONFIG.loops, 80)
-    resampling = Resampling(header.grid, Grid.of(fine, "doppler_azimuth"), centred=True)
+    resampling = Resampling(header.grid, MapGrid.of(fine, "doppler_azimuth"), centred=True)
     both = torch.stack([torch.from_numpy(made[name]) for name in MAPS["translation"]], dim=1).float()
     assert torch.equal(shown.maps[:, -1], resampling(both))
 

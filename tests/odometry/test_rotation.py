@@ -10,7 +10,7 @@ from radarize.io.pose import wrap
 from radarize.odometry.bearings import YAW
 from radarize.odometry.claims import Claims
 from radarize.odometry.doppler import Velocities
-from radarize.odometry.localmap import LocalMap, MapView
+from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
 from radarize.radar.presets import PRESETS
 from radarize.signal.batch import Signal
@@ -208,7 +208,7 @@ def test_a_map_that_is_left_behind_is_empty():
     rng = np.random.default_rng(3)
     ranges, sines = np.arange(0.2, 4, 0.045), np.linspace(-0.85, 0.85, 69)
     feature = rng.normal(size=(len(ranges), len(sines))).astype(np.float32)
-    view = MapView(feature, ranges, sines)
+    view = View(feature, ranges, sines)
     grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
     grid.blend(view, np.zeros(2), 0.0, 0.05)
     assert grid.correlate(view, np.zeros((1, 2)), yaws)[0][0] > 0.5

@@ -55,7 +55,8 @@ def _take_kernels(packages: Path) -> None:
             shutil.copystat(source, packages / source.relative_to(ROOT))
         for pattern in ("*.nb[ic]", "*.sources"):
             for kernel in (ROOT / name).rglob(f"__pycache__/{pattern}"):
-                shutil.copy2(kernel, packages / kernel.relative_to(ROOT))
+                if (packages / kernel.relative_to(ROOT)).parent.is_dir():  # not of a folder that is gone
+                    shutil.copy2(kernel, packages / kernel.relative_to(ROOT))
 
 
 @pytest.fixture(scope="module")

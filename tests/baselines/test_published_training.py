@@ -246,12 +246,12 @@ def test_from_data_to_a_run(data, tmp_path):
     for kind in TASKS:
         named = ["train", f"published-{kind}"] if kind == "rotation" else ["train", kind, "--settings", "published"]
         arguments = [*named, "--data", str(data), "--width", "2", "--epochs", "1"]
-        arguments += ["--batch", "4", "-o", str(tmp_path / f"{kind}.safetensors"), "--device", "cpu"]
+        arguments += ["--batch", "4", "-o", str(tmp_path / f"published-{kind}.safetensors"), "--device", "cpu"]
         done = CliRunner().invoke(app, arguments)
         assert done.exit_code == 0, done.output
-        header = load(tmp_path / f"{kind}.safetensors", TASKS[kind].network, CONFIG)[1]
+        header = load(tmp_path / f"published-{kind}.safetensors", TASKS[kind].network, CONFIG)[1]
         assert header.setting == "published" and header.grid.frame_period == pytest.approx(2 / 30, rel=1e-3)
-    assert header_of(tmp_path / "rotation.safetensors").spacings == (1, 2, 3, 4)
+    assert header_of(tmp_path / "published-rotation.safetensors").spacings == (1, 2, 3, 4)
     output = tmp_path / "run"
     arguments = ["run", str(data / "0.h5"), "-o", str(output), "--settings", "published", "--weights", str(tmp_path)]
     done = CliRunner().invoke(app, arguments)

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from radarize.evaluation.benchmark import odometry, runtime
-from radarize.evaluation.benchmark.choices import CHOICES, EVALUATION, helped
+from radarize.evaluation.benchmark.choices import CHOICES, SETS, helped
 from radarize.evaluation.benchmark.dataset import DataSet, groups
 from radarize.evaluation.benchmark.followed import FrameErrors
 from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, commit
@@ -163,7 +163,7 @@ def test_a_recording_tells_its_way_and_whether_it_is_real(rooms):
 def test_which_recordings_helped_to_choose_is_looked_up():
     tasks = Specification.load("evaluation").tasks
     assert [task.seed for task in tasks] == [seed for seeds in EVALUATION.values() for seed in seeds]
-    walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in EVALUATION.items() for seed in seeds]
+    walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in SETS["EVALUATION"].items() for seed in seeds]
     said = helped(walks)
     assert len(said) == 2 and said[0].startswith("at most 4 of 15 helped to choose the probability")
     assert helped(walks[:2])[1].startswith("at most 2 of 2")

@@ -76,10 +76,14 @@ def _joined(*sets: Seeds) -> Seeds:
     return {scene: tuple(dict.fromkeys(seed for each in sets for seed in each.get(scene, ()))) for scene in scenes}
 
 
+def _seeds(walks: dict[str, list[int | None]]) -> Seeds:
+    return {scene: tuple(seeds) for scene, seeds in walks.items()}
+
+
 def _sets(known: dict[str, dict]) -> dict[str, Seeds]:
     found: dict[str, Seeds] = {}
     for name, about in known.items():  # those that others are made of come first
-        own = {scene: tuple(seeds) for scene, seeds in about.items() if scene not in ("of", "radarhd")}
+        own = _seeds({scene: seeds for scene, seeds in about.items() if scene not in ("of", "radarhd")})
         own |= {NamedWalk.radarhd(number).scene: (None,) for number in about.get("radarhd", ())}
         found[name] = _joined(*(found[other] for other in about.get("of", ())), own)
     return found

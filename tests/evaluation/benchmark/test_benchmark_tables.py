@@ -162,7 +162,7 @@ def test_a_recording_tells_its_way_and_whether_it_is_real(rooms):
 
 def test_which_recordings_helped_to_choose_is_looked_up():
     tasks = Specification.load("evaluation").tasks
-    assert [task.seed for task in tasks] == [seed for seeds in EVALUATION.values() for seed in seeds]
+    assert [task.seed for task in tasks] == [seed for seeds in SETS["EVALUATION"].values() for seed in seeds]
     walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in SETS["EVALUATION"].items() for seed in seeds]
     said = helped(walks)
     assert len(said) == 2 and said[0].startswith("at most 4 of 15 helped to choose the probability")

@@ -19,7 +19,7 @@ import torch
 from jaxtyping import UInt8
 from torch import Generator, Tensor
 
-from benchmarks.results import CLONE, Page, radarhd, script, tracked
+from benchmarks.results import CLONE, Page, UsedNetwork, radarhd, script, tracked
 from radarize.baselines.pictures.network import PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.training import DENSE, elsewhere, entropy, unpacked

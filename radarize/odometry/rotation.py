@@ -30,10 +30,9 @@ from radarize.io.pose import compose
 from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
-from radarize.odometry.gaussian import Gaussian
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
-from radarize.odometry.ties import wandered
+from radarize.odometry.smoother import Gaussian, wandered
 from radarize.signal.batch import Batch
 from radarize.signal.heatmaps import Heatmaps
 
@@ -48,8 +47,6 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: rad/s^0.5: what every step claims, taken for independent.
-_JITTER = np.radians(0.6)
 #: rad^0.5: what a heading is off by that nothing takes back, for what it has turned: 0.6 degrees a quarter turn. A
 #: sensor that stands or goes straight hardly drifts (chosen on the walks of `benchmark.choices.CLAIMS`).
 _DRIFT = 0.0086
@@ -57,8 +54,8 @@ _DRIFT = 0.0086
 _RING = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
 LAG = 0.2
-#: Of the first frame of all, what `Rotations` says.
-_FIRST = (0.0, 0.0, True, 0.0, 1.0, 0.0)
+#: `Rotations` of the first frame of all.
+_FIRST = (0.0, 0.0, True, 1.0, 0.0)
 #: Places in the filter of the turning rate, and of the angle at which the map lies.
 _RATE, _MAP = 1, 2
 
@@ -67,27 +64,30 @@ _RATE, _MAP = 1, 2
 class Rotations:
     """Yaw increments, one per frame, from the burst centre of the frame before to this frame's.
 
+    Their errors are those of `radarize.odometry.uncertainty.ErrorModel`: of the heading, which are corrected later, and
+    noise that nothing corrects.
+
     Attributes:
         yaw: (frame,) rad, positive to the left; zero for the very first frame.
-        variance: (frame,) rad^2, for those who take turns for independent.
+        noise: (frame,) rad^2, variance of what each turn adds.
         seen: (frame,) False where nothing was measured of it: the turn is what went before, or what a network makes of
             next to no echoes, which may be off by all that the sensor turned.
-        noise, kept, held: (frame,) how their errors go on, as in `radarize.odometry.claims.Claims`; noise: rad^2.
+        correlation: (frame,) share of the heading's error before that goes on.
+        variance: (frame,) rad^2, of the heading's error at the frame.
     """
 
     yaw: Float[np.ndarray, "frame"]
-    variance: Float[np.ndarray, "frame"]
-    seen: Bool[np.ndarray, "frame"]
     noise: Float[np.ndarray, "frame"]
-    kept: Float[np.ndarray, "frame"]
-    held: Float[np.ndarray, "frame"]
+    seen: Bool[np.ndarray, "frame"]
+    correlation: Float[np.ndarray, "frame"]
+    variance: Float[np.ndarray, "frame"]
 
     @classmethod
     def independent(
-        cls, yaw: Float[np.ndarray, "frame"], variance: Float[np.ndarray, "frame"], seen: Bool[np.ndarray, "frame"]
+        cls, yaw: Float[np.ndarray, "frame"], noise: Float[np.ndarray, "frame"], seen: Bool[np.ndarray, "frame"]
     ) -> "Rotations":
-        """Turns whose errors know nothing of each other."""
-        return cls(yaw, variance, seen, variance, np.ones(len(yaw)), np.zeros(len(yaw)))
+        """Turns whose errors are independent."""
+        return cls(yaw, noise, seen, np.ones(len(yaw)), np.zeros(len(yaw)))
 
 
 class RotationConfig(Frozen):
@@ -196,17 +196,17 @@ class MapRotation:
             if self._time is None:
                 turns.append(_FIRST)
             else:
-                turn = None if told is None else (told.yaw[i], told.variance[i])
+                turn = None if told is None else (told.yaw[i], told.noise[i])
                 turns.append(self._turn(view, time, dt, velocity, turn, echoes))
             self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
-        yaw, variance, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
-        return Rotations(yaw, variance, seen.astype(bool), *lasting)
+        yaw, noise, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
+        return Rotations(yaw, noise, seen.astype(bool), *lasting)
 
     def _doubted(self, told: Rotations) -> Rotations:
         """What a network says; where frames are missing none has spoken, but what is known of how turning rates
         wander."""
-        return replace(told, variance=np.where(told.seen, self.settings.doubt, 1.0) * told.variance)
+        return replace(told, noise=np.where(told.seen, self.settings.doubt, 1.0) * told.noise)
 
     def _turn(
         self,
@@ -216,8 +216,8 @@ class MapRotation:
         velocity: Float[np.ndarray, "2"],
         told: tuple[float, float] | None,
         echoes: list[Echo],
-    ) -> tuple[float, float, bool, float, float, float]:
-        """What `Rotations` says of a frame `dt` s after the last one."""
+    ) -> tuple[float, float, bool, float, float]:
+        """`Rotations` of a frame `dt` s after the last one."""
         state, mean = self._state, (self._velocity + velocity) / 2
         start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
         state.remember(YAW)
@@ -227,14 +227,11 @@ class MapRotation:
         self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
         self._position = self._seen_from(0.0)
         seen = self._match(view) or seen
-        # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
-        # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
-        held = state.covariance[YAW, YAW]
-        turned, unseen = state.mean[YAW] - start, self.settings.unseen**2 * dt
-        jitter, drift = (_JITTER**2 * dt, _DRIFT**2 * abs(turned)) if seen else (unseen, unseen)
+        variance, turned = state.covariance[YAW, YAW], state.mean[YAW] - start
+        drift = _DRIFT**2 * abs(turned) if seen else self.settings.unseen**2 * dt
         # The part of this error that the one before explains: regression of the filter's errors on each other.
-        kept = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
-        return turned, abs(held - known) + jitter, seen, drift, kept, held
+        correlation = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
+        return turned, drift, seen, correlation, variance
 
     @property
     def _laid(self) -> float:

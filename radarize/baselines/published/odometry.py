@@ -7,8 +7,8 @@ from jaxtyping import Float, Float16
 from radarize.baselines.published.maps import PublishedStream
 from radarize.io.pose import between, wrap
 from radarize.io.stopwatch import stage
-from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.signal.batch import Batch
 
 #: Frames of 15 Hz over which turns are told, and so interleaved chains of yaws.
@@ -84,4 +84,4 @@ def window(net: torch.nn.Module, made: dict[str, Float16[np.ndarray, "frame row 
 def _track(times, poses, steps, spreads, velocity, velocity_spread) -> Track:
     """The artefact always takes velocity and turn for seen, and steps for independent."""
     seen = np.ones((2, len(times)), bool)
-    return Track(times, poses, steps, spreads, velocity, velocity_spread, *seen, Claims.independent(spreads))
+    return Track(times, poses, steps, velocity, velocity_spread, *seen, ErrorModel.independent(spreads))

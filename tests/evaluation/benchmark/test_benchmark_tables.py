@@ -18,7 +18,7 @@ from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.io.alignment import trajectory
 from radarize.io.errors import InputError
 from radarize.io.tum import planar_poses
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Weights
 from radarsim.dataset.specification import Specification
 from tests.evaluation.benchmark.rooms import write_rooms
@@ -77,7 +77,7 @@ def followed(length: float, speed: float, turn: float, frames: int = 40) -> tupl
         velocity,
         np.column_stack([zero, zero, turn * np.arange(frames)]),
         zero,
-        Claims.independent(np.tile(np.eye(3) * 1e-4, (frames, 1, 1))),
+        ErrorModel.independent(np.tile(np.eye(3) * 1e-4, (frames, 1, 1))),
         1 / 30,
     )
     return found, errors.summary()

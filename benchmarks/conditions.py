@@ -20,6 +20,7 @@ from radarize.io.alignment import trajectory
 from radarize.io.jobs import Report
 from radarize.io.recording import Recording
 from radarize.io.tum import planar_poses
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.health import Health
 from radarize.pipeline.method import Inputs
 from radarize.pipeline.methods import BEST, make_pipeline
@@ -72,12 +73,11 @@ class Trial(NamedTuple):
                     health.add(result)
                     tracks.append(result.track)
             pipeline.finish()
-        times, poses, spread = (
-            np.concatenate([getattr(t, name) for t in tracks]) for name in ("time", "pose", "covariance")
-        )
+        times, poses = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("time", "pose"))
+        spread = ErrorModel.joined([track.errors for track in tracks]).since_start(poses)[-1]
         found = (times, poses), pipeline.slam.trajectory()
         errors = (evaluate_trajectory(trajectory(at, planar_poses(each)), truth) for at, each in found)
-        return Outcome(*errors, float(np.sqrt(spread[:, 2, 2].sum())), {each.kind for each in health.found})
+        return Outcome(*errors, float(np.sqrt(spread[2, 2])), {each.kind for each in health.found})
 
 
 class Outcome(NamedTuple):

@@ -19,7 +19,7 @@ import torch
 from jaxtyping import UInt8
 from torch import Generator, Tensor
 
-from benchmarks.results import CLONE, Network, Page, radarhd, script, tracked
+from benchmarks.results import CLONE, Page, UsedNetwork, radarhd, script, tracked
 from radarize.baselines.pictures.network import PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.training import DENSE, elsewhere, entropy, unpacked
@@ -208,7 +208,7 @@ def main(options: argparse.Namespace) -> Page:
     return Page(
         rows,
         data=radarhd("RadarHD's test walks", walks),
-        networks=tuple(Network.of(path) for path in paths.values()),
+        networks=tuple(UsedNetwork.of(path) for path in paths.values()),
         notes=[
             "Median Chamfer distance of a walk's points from the lidar's of the same instant, and of the same number, "
             "m, mean over the walks of a group; `alone`: trained on real walks alone; `tuned`: trained on simulated "

@@ -19,7 +19,7 @@ import psutil
 
 from benchmarks.results import Data, Page, same, script, surroundings
 from radarize.capture.live import Live, prepare
-from radarize.capture.page import Page as LivePage
+from radarize.capture.page import LivePage
 from radarize.capture.replay import Replay
 from radarize.evaluation.benchmark.networks import Networks
 from radarize.evaluation.benchmark.runs import Pair

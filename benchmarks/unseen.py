@@ -28,7 +28,7 @@ from radarize.io.alignment import trajectory, yaws
 from radarize.io.console import progress
 from radarize.io.pose import Pose, between, wrap
 from radarize.io.tum import planar
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.methods import BEST
 from radarize.pipeline.runfolder import RunFolder
 from radarsim.dataset.run import make
@@ -62,18 +62,18 @@ def recorded(walks: Path, folder: Path, workers: int | None) -> DataSet:
     return DataSet.load(folder)
 
 
-def pose_nees(poses: Pose, true: Pose, claims: Claims, starts: range, length: int) -> Float[np.ndarray, "window"]:
+def pose_nees(poses: Pose, true: Pose, errors: ErrorModel, starts: range, length: int) -> Float[np.ndarray, "window"]:
     """Squared error of a motion over windows of some frames over what it claims, per dimension.
 
     Args:
         poses, true: of each frame.
-        claims: of the steps between poses.
+        errors: of the steps between poses.
         starts: of the windows.
         length: of each, frames.
     """
     first = np.array(starts)
     moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
-    return normalised(between(truly, moved), claims.motions(poses, first, length))
+    return normalised(between(truly, moved), errors.motions(poses, first, length))
 
 
 def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
@@ -108,7 +108,7 @@ def _nees(run: Path, span: float) -> np.ndarray:
     times, poses = folder.odometry
     rate = 1 / np.median(np.diff(times))
     starts = range(0, len(times) - round(span * rate), round(rate))
-    return pose_nees(planar(poses), true_poses(folder), folder.claims, starts, round(span * rate))
+    return pose_nees(planar(poses), true_poses(folder), folder.errors, starts, round(span * rate))
 
 
 def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:

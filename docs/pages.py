@@ -24,7 +24,7 @@ def lay_out() -> None:
     shutil.rmtree(PAGES, ignore_errors=True)
     pages = [*(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks" / "results").glob("*.md")]
     pages += [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
-    pages.append(ROOT / "radarize" / "weights" / "README.md")
+    pages.append(ROOT / "radarize" / "learning" / "weights" / "README.md")
     linked = {(page.parent / link).resolve() for page in pages for link in LINK.findall(page.read_text())}
     for path in {*pages, *(path for path in linked if path.is_file())}:
         place = PAGES / path.relative_to(ROOT)

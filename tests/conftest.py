@@ -1,5 +1,7 @@
 import os
+import shutil
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +20,15 @@ LONGEST = {"documents", "fuzzing", "training", "twin"}
 
 def pytest_runtest_setup():
     checked.begin_test()
+
+
+def pytest_configure(config):
+    """Temporary files of commands, browsers and clusters go into one folder, which goes with the session. It has a
+    short name, for sockets lie in it; pytest's own folders stay where they are."""
+    if not hasattr(config, "workerinput"):
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
+        os.environ["TMPDIR"] = tempfile.tempdir = tempfile.mkdtemp(prefix="rz-")
+        config.add_cleanup(lambda: shutil.rmtree(os.environ["TMPDIR"], ignore_errors=True))
 
 
 def pytest_collection_modifyitems(items):

@@ -116,6 +116,13 @@ def cycle(graph: dict[str, set[str]]) -> list[str]:
     return []
 
 
+def test_few_rooms():
+    """Packages and files of `radarize`, without folders that only hold what an older checkout has compiled."""
+    inside = (ROOT / "radarize").iterdir()
+    entries = {path.name for path in inside if path.is_file() or (path / "__init__.py").is_file()}
+    assert len(entries) <= 14, sorted(entries)
+
+
 def test_the_pipeline_needs_no_simulator():
     """A user with a real radar needs no ray tracer."""
     tracer = {"radarsim", *EXTRAS["sim"]}

@@ -55,7 +55,8 @@ def _take_kernels(packages: Path) -> None:
             shutil.copystat(source, packages / source.relative_to(ROOT))
         for pattern in ("*.nb[ic]", "*.sources"):
             for kernel in (ROOT / name).rglob(f"__pycache__/{pattern}"):
-                shutil.copy2(kernel, packages / kernel.relative_to(ROOT))
+                if (packages / kernel.relative_to(ROOT)).parent.is_dir():  # not of a folder that is gone
+                    shutil.copy2(kernel, packages / kernel.relative_to(ROOT))
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +94,7 @@ def test_the_wheel_holds_what_the_repository_does(wheel):
     }
     boards = {f"radarize/radar/boards/{name}.yaml" for name in BOARDS}
     pages = {"radarize/capture/live.html", "radarize/evaluation/report/templates/page.html"}
-    types = {f"{package}/{name}" for package in ("radarize", "radarsim") for name in ("__init__.pyi", "py.typed")}
+    types = {f"{package}/{name}" for package in ("radarize", "radarsim") for name in ("__init__.py", "py.typed")}
     assert found >= scenes | weights | boards | pages | types
     assert {name.split("/")[0] for name in found} == {"radarize", "radarsim", f"radarize-{__version__}.dist-info"}
     assert wheel.stat().st_size < 20e6

@@ -26,7 +26,7 @@ from radarize.capture.replay import Replay
 from radarize.capture.sensor import Sensor
 from radarize.capture.stream import follow
 from radarize.io.pose import between, compose, inverse
-from radarize.odometry.claims import Unknown
+from radarize.odometry.uncertainty import MotionCovariance
 from radarize.pipeline.method import Inputs
 from radarize.pipeline.methods import best_methods, make_pipeline, pace
 from radarize.pipeline.runfolder import OccupancyMap
@@ -62,7 +62,8 @@ class RadarizeNode(Node):
         self.odometry = self.create_publisher(Odometry, "odom", 10)
         self.transforms = self.create_publisher(TFMessage, "/tf", 10)
         self.maps = self.create_publisher(OccupancyGrid, "map", latched())
-        self._map_due, self._unknown = -math.inf, Unknown()
+        self._map_due = -math.inf
+        self._motion: MotionCovariance | None = None  # since the first frame
 
     def run(self, stopping: threading.Event) -> None:
         """Follow the radar until it ends or ROS does."""
@@ -82,9 +83,12 @@ class RadarizeNode(Node):
         if not len(track.pose):
             return
         for k, step in enumerate(track.step):
-            self._unknown.step(step, track.claims, k)
+            if self._motion is None:
+                self._motion = MotionCovariance(track.errors.variance[k])
+            else:
+                self._motion.step(step, track.errors[k])
         stamp, pose = float(track.time[-1]), track.pose[-1]
-        self.odometry.publish(odometry_message(stamp, pose, track.velocity[-1], self._unknown.covariance))
+        self.odometry.publish(odometry_message(stamp, pose, track.velocity[-1], self._motion.covariance))
         node = slam.nodes[-1] if slam.nodes else None
         on_map = compose(slam.graph.poses[-1], between(slam.odometry.pose(node.time), pose)) if node else pose
         links = [transform(stamp, MAP, ODOM, compose(on_map, inverse(pose))), transform(stamp, ODOM, BASE, pose)]

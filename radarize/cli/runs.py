@@ -152,7 +152,7 @@ def view(
         Path | None, typer.Option(metavar="FILE", help="Write .rrd, or .mcap for Foxglove, instead of a window.")
     ] = None,
 ) -> None:
-    """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
+    """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and path types on one time line."""
     written: Path | None
     with progress("view") as report:
         if save is not None and save.suffix == ".mcap":

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from torch import Generator, Tensor, nn
 
 from radarize.io.plugins import Plugins
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import FeatureTable, Reading
 from radarize.learning.nets.gaussian import Gaussian
 from radarize.learning.nets.weights import Header, Network, build
@@ -84,14 +84,14 @@ class Task(ABC, Generic[Inputs]):
         """All that its network reads of a frame."""
         return (*self.maps, *(reading.name for reading in self.sensed))
 
-    def header(self, settings: Settings, grid: Grid | None, **about: Any) -> Header:
+    def header(self, settings: Settings, grid: MapGrid | None, **about: Any) -> Header:
         """What its weights' file says; see `Header` for what else to say."""
         return Header(
             kind=self.network.kind, setting=self.network.setting, frames=settings.frames, maps=self.reads,
             width=settings.width, grid=grid, seed=settings.seed, **about,
         )  # fmt: skip
 
-    def net(self, settings: Settings, grid: Grid | None) -> Network:
+    def net(self, settings: Settings, grid: MapGrid | None) -> Network:
         """A network for maps of a grid, if it reads any, with random weights from torch's generator."""
         return build(self.network, self.header(settings, grid))
 
@@ -100,7 +100,7 @@ class Task(ABC, Generic[Inputs]):
         paths: Sequence[Path],
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
-        grid: Grid | None = None,
+        grid: MapGrid | None = None,
     ) -> FeatureTable:
         """All that it reads of recordings, see `FeatureTable.read`."""
         return FeatureTable.read(paths, self.maps, self.truth, self.sensed, self.network.maker, workers, progress, grid)

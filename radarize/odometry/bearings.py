@@ -21,8 +21,8 @@ from jaxtyping import Float
 
 from radarize.io.pose import wrap
 from radarize.odometry.echoes import Echo
-from radarize.odometry.gaussian import Gaussian, Row
 from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.odometry.smoother import Gaussian, Row
 from radarize.signal.heatmaps import Heatmaps
 
 #: Place of the heading in the filter.

@@ -1,16 +1,16 @@
 """A path from displacements over longer than a frame, told anew at every frame.
 
-They are reconciled as positions of the last frames that the differences tie together (`Ties`), as in filters with
-cloned states. Windows overlap, so that as many of them as fit into one are believed as much as one.
+They are reconciled as positions of the last frames (`FixedLagSmoother`), as in filters with cloned states. Windows
+overlap, so that as many of them as fit into one are believed as much as one.
 """
 
 import numpy as np
 
 from radarize.io.pose import between
 from radarize.learning.features.windows import spaced
-from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
-from radarize.odometry.ties import Ties
+from radarize.odometry.smoother import FixedLagSmoother
+from radarize.odometry.uncertainty import ErrorModel
 
 #: m/s^1.5 and m/s: by how much a walker's speed wanders in a second, and standard deviation of one not known at all.
 _WANDER, _FASTEST = 0.37, 1.0
@@ -31,7 +31,7 @@ class Displacements:
     def __init__(self, lasts: float, period: float):
         self.reach = max(1, round(lasts / period))
         self._apart, self._period = self.reach * period, period
-        self._axes = [Ties(self.reach + 1, _WANDER, _FASTEST) for _ in range(2)]
+        self._axes = [FixedLagSmoother(self.reach + 1, _WANDER, _FASTEST) for _ in range(2)]
         self._times = np.zeros(0)
         self._first: np.ndarray | None = None
         self._pose = np.zeros(3)
@@ -59,18 +59,18 @@ class Displacements:
             covariance: of it.
             yaw: rad, on these axes; doubt: variance of its change since the frame before.
         """
-        for axis, ties in enumerate(self._axes):
-            ties.predict(dt)
-            ties.tie(back, displacement[axis], self.reach * covariance[axis, axis])
-        place = np.array([*(ties.values[-1] for ties in self._axes), yaw])
+        for axis, smoother in enumerate(self._axes):
+            smoother.predict(dt)
+            smoother.add_relative_motion(back, displacement[axis], self.reach * covariance[axis, axis])
+        place = np.array([*(each.values[-1] for each in self._axes), yaw])
         self._first = place if self._first is None else self._first
         before, self._pose = self._pose, between(self._first, place)
-        spread = np.diag([*(ties.variance(1) for ties in self._axes), 0.0])
+        spread = np.diag([*(each.since(1) for each in self._axes), 0.0])
         cos, sin = np.cos(yaw), np.sin(yaw)
         turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
         spread = turned @ spread @ turned.T + np.diag([1e-8, 1e-8, min(doubt, np.pi**2)])
-        rate = turned[:2, :2] @ [ties.rate for ties in self._axes]
-        known = turned[:2, :2] @ np.diag([ties.covariance[-1, -1] for ties in self._axes]) @ turned[:2, :2].T
+        rate = turned[:2, :2] @ [each.rate for each in self._axes]
+        known = turned[:2, :2] @ np.diag([each.covariance[-1, -1] for each in self._axes]) @ turned[:2, :2].T
         return self._pose, between(before, self._pose), spread, rate, known, back > 0
 
 
@@ -78,4 +78,4 @@ def joined(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bo
     """What `Displacements.next` said of every frame; turns are seen with displacements, or always."""
     *values, seen = (np.stack(each) for each in zip(*track, strict=True))
     pose, step, spread, *velocity = values
-    return Track(times, pose, step, spread, *velocity, seen, seen | turn_seen, Claims.independent(spread))
+    return Track(times, pose, step, *velocity, seen, seen | turn_seen, ErrorModel.independent(spread))

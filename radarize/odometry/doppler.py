@@ -71,9 +71,10 @@ class DopplerConfig(Frozen):
     still: float = setting(
         0.02, "m/s; below it and within the fit's own error, if most echoes are still, the sensor stands", ge=0
     )
-    independent: float = setting(
-        0.25, "of the covariance of the fit, what is left where errors that echoes share are told apart; chosen with "
-        "the next two on data set odometry-choice, six walks of 20 s (by hand, cart, robot; A and B of seed 201)", gt=0
+    few: float = setting(
+        32.0, "agreeing echoes for which the covariance of the fit is doubled, and more for fewer, of which a larger "
+        "share has come over several surfaces; chosen on 12 walks of 60 s (handheld, cart, robot; A to D of seeds 301 "
+        "to 304)", ge=0
     )  # fmt: skip
     scale_noise: float = setting(
         0.003, "of the speed, standard deviation of what echoes share along it: their elevation", ge=0
@@ -122,7 +123,8 @@ class DopplerVelocity:
         found = [self._solve(self._echoes(*frame)) for frame in frames]
         velocity, covariance, inliers = map(np.array, zip(*found, strict=True))
         seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
-        covariance[seen] = self.settings.independent * covariance[seen] + self._shared(velocity[seen])
+        doubt = 1 + (self.settings.few / inliers[seen]) ** 4
+        covariance[seen] = doubt[:, None, None] * covariance[seen] + self._shared(velocity[seen])
         return Velocities(velocity, covariance, inliers, seen)
 
     def _shared(self, velocity: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "frame 2 2"]:

@@ -10,9 +10,9 @@ from radarize.io.errors import InputError
 from radarize.io.plain import Frozen, setting
 from radarize.io.pose import compose, exponential
 from radarize.io.stopwatch import stage
-from radarize.odometry.claims import Claims, half_turned
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
+from radarize.odometry.uncertainty import ErrorModel, half_turned
 from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Batch
 
@@ -22,11 +22,9 @@ from radarize.signal.batch import Batch
 _BRIDGED, _SMOOTH = 0.32, 1.0
 #: s, over which turns are averaged to a rate.
 _STEADY = 0.1
-#: s, for which errors of velocities last, as exp(-t / it), those in a row being of the same echoes: so claims of steps
-#: add up to those of a way (chosen on seven walks of 60 s, by hand in A to D of seeds 301 to 304 and by cart in A to C,
-#: where claims of independent errors had a NEES of 4 to 19 over a second). Less where claims know of each other, and of
-#: what lasts longer (chosen on the walks of `radarize.evaluation.benchmark.choices.CLAIMS`).
-_LASTING, _LASTING_BESIDE = 0.25, 0.08
+#: s, time constant of the correlation of errors of velocities, those in a row being of the same echoes (chosen on 12
+#: walks of 60 s: handheld, cart and robot in A to D of seeds 301 to 304).
+LASTING = 1.0
 
 
 class VelocityEstimator(Protocol):
@@ -45,9 +43,8 @@ class RotationEstimator(Protocol):
     """Yaw increments from frame to frame, given the filtered velocities.
 
     Attributes:
-        lag: standard deviation of a turn as a share of it, beside what is claimed of it. Who lags in a turn lags in all
-            of its frames: errors of up to 6 deg a corner add up instead of averaging out, and independent steps can
-            only say so if each claims more.
+        lag: standard deviation of a turn as a share of it, beside its own. Who lags in a turn lags in all of its
+            frames: errors of up to 6 deg a corner add up instead of averaging out.
     """
 
     lag: float
@@ -63,23 +60,21 @@ class Track:
         time: (frame,) burst centres, s.
         pose: (frame, 3) x, y (m) and yaw (rad, wrapped), the first frame of all being the origin.
         step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
-        covariance: (frame, 3, 3) of `step`, in the frame at its end, for those who take steps for independent.
         velocity: (frame, 2) filtered, m/s, sensor frame.
         velocity_covariance: (frame, 2, 2), m^2/s^2.
         velocity_seen, turn_seen: (frame,) False where odometry was blind: nothing determined the velocity at the frame,
             or the turn since the one before; what stands there is what went before.
-        claims: how far motions over any frames may be off.
+        errors: of the steps.
     """
 
     time: Float[np.ndarray, "frame"]
     pose: Float[np.ndarray, "frame 3"]
     step: Float[np.ndarray, "frame 3"]
-    covariance: Float[np.ndarray, "frame 3 3"]
     velocity: Float[np.ndarray, "frame 2"]
     velocity_covariance: Float[np.ndarray, "frame 2 2"]
     velocity_seen: Bool[np.ndarray, "frame"]
     turn_seen: Bool[np.ndarray, "frame"]
-    claims: Claims
+    errors: ErrorModel
 
 
 class VelocityConfig(Frozen):
@@ -158,25 +153,32 @@ class Odometry:
 
     def _integrate(self, times: np.ndarray, velocities: Velocities, rotations: Rotations) -> Track:
         frames = len(times)
-        pose, step, covariance = np.empty((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3, 3))
-        noise = np.zeros((frames, 3, 3))
+        pose, step, duration = np.empty((frames, 3)), np.zeros((frames, 3)), np.zeros(frames)
+        noise, correlation, variance = np.zeros((frames, 3, 3)), np.ones((frames, 2)), np.zeros((frames, 3, 3))
+        correlation[:, 0], variance[:, 0, 0], variance[:, 1:, 1:] = (
+            rotations.correlation, rotations.variance, velocities.covariance
+        )  # fmt: skip
         for i in range(frames):
             velocity, spread = velocities.velocity[i], velocities.covariance[i]
             if self._last is not None:
                 time, last_velocity, last_spread = self._last
-                dt = times[i] - time
+                dt = duration[i] = times[i] - time
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
                 half, lag = half_turned(step[i]), (self.rotation.lag * rotations.yaw[i]) ** 2
-                apart = (covariance, rotations.variance, _LASTING), (noise, rotations.noise, _LASTING_BESIDE)
-                for claimed, turned, lasting in apart:
-                    claimed[i] = min(turned[i] + lag, np.pi**2) * np.outer(half, half)
-                    claimed[i, :2, :2] += dt**2 / np.tanh(dt / (2 * lasting)) * (last_spread + spread) / 2
-                    claimed[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
+                noise[i] = min(rotations.noise[i] + lag, np.pi**2) * np.outer(half, half)
+                noise[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
+                correlation[i, 1] = _correlation(dt, last_spread, spread)
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
-        claims = Claims(noise, rotations.kept, rotations.held)
+        errors = ErrorModel(duration, noise, correlation, variance)
         seen = velocities.seen, rotations.seen
-        return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance, *seen, claims)
+        return Track(times, pose, step, velocities.velocity, velocities.covariance, *seen, errors)
+
+
+def _correlation(dt: float, before: Float[np.ndarray, "2 2"], now: Float[np.ndarray, "2 2"]) -> float:
+    """Share of a velocity's error that goes on for `dt` s: no more than leaves the covariance that it has now."""
+    least = np.linalg.eigvals(np.linalg.solve(before, now)).real.min()
+    return float(np.exp(-dt / LASTING) * np.sqrt(np.clip(least, 0.0, 1.0)))
 
 
 def intervals(times: Float[np.ndarray, "frame"], last: float | None) -> Float[np.ndarray, "frame"]:

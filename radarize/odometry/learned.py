@@ -12,7 +12,7 @@ from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import LAG, Rotations
 from radarize.odometry.settings import TurnConfig
-from radarize.odometry.ties import Ties
+from radarize.odometry.smoother import FixedLagSmoother
 from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Batch
 
@@ -60,7 +60,7 @@ class LearnedRotation:
     """Rotation estimator by `RotationNet`: turns over several spacings, reconciled by a filter.
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
-    one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
+    one Gaussian state (`FixedLagSmoother`), which goes on at its rate where frames are lost.
 
     Attributes:
         lag: see `RotationEstimator`.
@@ -78,7 +78,7 @@ class LearnedRotation:
         size = self.spacings[-1] + 1
         self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
-        self._yaws = Ties(size, settings.wander, settings.fastest)
+        self._yaws = FixedLagSmoother(size, settings.wander, settings.fastest)
         self._alike = settings.alike
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
@@ -95,7 +95,7 @@ class LearnedRotation:
                 # a turn of a later frame.
                 self._yaws.part()
             for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
-                self._yaws.tie(int(ago), turn, noise)
+                self._yaws.add_relative_motion(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last
             growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
         told = (back > 0).any(axis=0)

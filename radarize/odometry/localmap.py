@@ -13,7 +13,7 @@ _OFF_MIDDLE = 1.0
 _MOST = 640
 
 
-class MapView(NamedTuple):
+class View(NamedTuple):
     """A frame as the map sees it.
 
     Attributes:
@@ -27,7 +27,7 @@ class MapView(NamedTuple):
     sines: Float[np.ndarray, "azimuth"]
 
 
-class PolarGrid(NamedTuple):
+class Grid(NamedTuple):
     """Cells of a map: mean of what was seen there, how often it was, and the cells' side, m."""
 
     mean: Float32[np.ndarray, "x y"]
@@ -47,16 +47,16 @@ class LocalMap:
     def __init__(self, reach: float, cell: float):
         cell = max(cell, 2 * (reach + 2 * _OFF_MIDDLE) / _MOST)
         side = 2 * int((reach + 2 * _OFF_MIDDLE) / cell)
-        self._grid = PolarGrid(*np.zeros((2, side, side), np.float32), cell)
+        self._grid = Grid(*np.zeros((2, side, side), np.float32), cell)
 
     def correlate(
-        self, view: MapView, positions: Float[np.ndarray, "yaw 2"], yaws: Float[np.ndarray, "yaw"]
+        self, view: View, positions: Float[np.ndarray, "yaw 2"], yaws: Float[np.ndarray, "yaw"]
     ) -> tuple[Float[np.ndarray, "yaw"], Float[np.ndarray, "yaw"]]:
         """Correlation (-1...1) of a frame with the map, seen at each yaw from its position (m), and how much of the
         frame's area (0...1) the map knows there."""
         return _correlate(view, self._grid, positions, yaws)
 
-    def blend(self, view: MapView, position: Float[np.ndarray, "2"], yaw: float, share: float) -> None:
+    def blend(self, view: View, position: Float[np.ndarray, "2"], yaw: float, share: float) -> None:
         """A frame joins the map: where it had been seen often, the frame's share of the cell's mean is `share`."""
         _blend(view, self._grid, position, yaw, share)
 
@@ -66,7 +66,7 @@ class LocalMap:
         steps = np.rint(position / cell).astype(int)
         if np.abs(steps).max() * cell <= _OFF_MIDDLE:
             return position
-        self._grid = PolarGrid(*(moved(each, -steps, order=0) for each in self._grid[:2]), cell)
+        self._grid = Grid(*(moved(each, -steps, order=0) for each in self._grid[:2]), cell)
         return position - steps * cell
 
     def forget(self) -> None:

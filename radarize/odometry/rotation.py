@@ -30,10 +30,9 @@ from radarize.io.pose import compose
 from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
-from radarize.odometry.gaussian import Gaussian
-from radarize.odometry.localmap import LocalMap, MapView
+from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
-from radarize.odometry.ties import wandered
+from radarize.odometry.smoother import Gaussian, wandered
 from radarize.signal.batch import Batch
 from radarize.signal.heatmaps import Heatmaps
 
@@ -48,8 +47,6 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: rad/s^0.5: what every step claims, taken for independent.
-_JITTER = np.radians(0.6)
 #: rad^0.5: what a heading is off by that nothing takes back, for what it has turned: 0.6 degrees a quarter turn. A
 #: sensor that stands or goes straight hardly drifts (chosen on the walks of `benchmark.choices.CLAIMS`).
 _DRIFT = 0.0086
@@ -57,8 +54,8 @@ _DRIFT = 0.0086
 _RING = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
 LAG = 0.2
-#: Of the first frame of all, what `Rotations` says.
-_FIRST = (0.0, 0.0, True, 0.0, 1.0, 0.0)
+#: `Rotations` of the first frame of all.
+_FIRST = (0.0, 0.0, True, 1.0, 0.0)
 #: Places in the filter of the turning rate, and of the angle at which the map lies.
 _RATE, _MAP = 1, 2
 
@@ -67,27 +64,30 @@ _RATE, _MAP = 1, 2
 class Rotations:
     """Yaw increments, one per frame, from the burst centre of the frame before to this frame's.
 
+    Their errors are those of `radarize.odometry.uncertainty.ErrorModel`: of the heading, which are corrected later, and
+    noise that nothing corrects.
+
     Attributes:
         yaw: (frame,) rad, positive to the left; zero for the very first frame.
-        variance: (frame,) rad^2, for those who take turns for independent.
+        noise: (frame,) rad^2, variance of what each turn adds.
         seen: (frame,) False where nothing was measured of it: the turn is what went before, or what a network makes of
             next to no echoes, which may be off by all that the sensor turned.
-        noise, kept, held: (frame,) how their errors go on, as in `radarize.odometry.claims.Claims`; noise: rad^2.
+        correlation: (frame,) share of the heading's error before that goes on.
+        variance: (frame,) rad^2, of the heading's error at the frame.
     """
 
     yaw: Float[np.ndarray, "frame"]
-    variance: Float[np.ndarray, "frame"]
-    seen: Bool[np.ndarray, "frame"]
     noise: Float[np.ndarray, "frame"]
-    kept: Float[np.ndarray, "frame"]
-    held: Float[np.ndarray, "frame"]
+    seen: Bool[np.ndarray, "frame"]
+    correlation: Float[np.ndarray, "frame"]
+    variance: Float[np.ndarray, "frame"]
 
     @classmethod
     def independent(
-        cls, yaw: Float[np.ndarray, "frame"], variance: Float[np.ndarray, "frame"], seen: Bool[np.ndarray, "frame"]
+        cls, yaw: Float[np.ndarray, "frame"], noise: Float[np.ndarray, "frame"], seen: Bool[np.ndarray, "frame"]
     ) -> "Rotations":
-        """Turns whose errors know nothing of each other."""
-        return cls(yaw, variance, seen, variance, np.ones(len(yaw)), np.zeros(len(yaw)))
+        """Turns whose errors are independent."""
+        return cls(yaw, noise, seen, np.ones(len(yaw)), np.zeros(len(yaw)))
 
 
 class RotationConfig(Frozen):
@@ -190,34 +190,34 @@ class MapRotation:
         turns = []
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
         for i, (feature, echoes) in enumerate(shown):
-            view = MapView(feature, self._ranges, self._bearing_sines)
+            view = View(feature, self._ranges, self._bearing_sines)
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
             if self._time is None:
                 turns.append(_FIRST)
             else:
-                turn = None if told is None else (told.yaw[i], told.variance[i])
+                turn = None if told is None else (told.yaw[i], told.noise[i])
                 turns.append(self._turn(view, time, dt, velocity, turn, echoes))
             self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
-        yaw, variance, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
-        return Rotations(yaw, variance, seen.astype(bool), *lasting)
+        yaw, noise, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
+        return Rotations(yaw, noise, seen.astype(bool), *lasting)
 
     def _doubted(self, told: Rotations) -> Rotations:
         """What a network says; where frames are missing none has spoken, but what is known of how turning rates
         wander."""
-        return replace(told, variance=np.where(told.seen, self.settings.doubt, 1.0) * told.variance)
+        return replace(told, noise=np.where(told.seen, self.settings.doubt, 1.0) * told.noise)
 
     def _turn(
         self,
-        view: MapView,
+        view: View,
         time: float,
         dt: float,
         velocity: Float[np.ndarray, "2"],
         told: tuple[float, float] | None,
         echoes: list[Echo],
-    ) -> tuple[float, float, bool, float, float, float]:
-        """What `Rotations` says of a frame `dt` s after the last one."""
+    ) -> tuple[float, float, bool, float, float]:
+        """`Rotations` of a frame `dt` s after the last one."""
         state, mean = self._state, (self._velocity + velocity) / 2
         start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
         state.remember(YAW)
@@ -227,14 +227,11 @@ class MapRotation:
         self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
         self._position = self._seen_from(0.0)
         seen = self._match(view) or seen
-        # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
-        # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
-        held = state.covariance[YAW, YAW]
-        turned, unseen = state.mean[YAW] - start, self.settings.unseen**2 * dt
-        jitter, drift = (_JITTER**2 * dt, _DRIFT**2 * abs(turned)) if seen else (unseen, unseen)
+        variance, turned = state.covariance[YAW, YAW], state.mean[YAW] - start
+        drift = _DRIFT**2 * abs(turned) if seen else self.settings.unseen**2 * dt
         # The part of this error that the one before explains: regression of the filter's errors on each other.
-        kept = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
-        return turned, abs(held - known) + jitter, seen, drift, kept, held
+        correlation = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
+        return turned, drift, seen, correlation, variance
 
     @property
     def _laid(self) -> float:
@@ -254,7 +251,7 @@ class MapRotation:
             state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
             state.covariance[YAW, YAW] = known + np.pi**2
 
-    def _join(self, view: MapView, share: float) -> None:
+    def _join(self, view: View, share: float) -> None:
         """A frame joins the map, which then lies as far wrong as its frames do on average."""
         self._position = self._map.follow(self._position)
         self._map.blend(view, self._position, self._laid, share)
@@ -262,7 +259,7 @@ class MapRotation:
         self._state.replace(_MAP, self._state.row({YAW: share, _MAP: 1 - share}))
         self._state.mean[_MAP] = lies  # where the frame was laid is no news
 
-    def _match(self, view: MapView) -> bool:
+    def _match(self, view: View) -> bool:
         """Correct the filter by how the frame lies in the map, and say whether that is known."""
         for flash in self._bearings.flashes:  # no landmarks: they slide along walls as the sensor does
             view.feature[np.abs(self._ranges - flash) < _RING] = 0.0
@@ -287,7 +284,7 @@ class MapRotation:
         both ends."""
         return compose(self._start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._way)[..., :2]
 
-    def _fit(self, view: MapView, spread: float) -> tuple[float, float]:
+    def _fit(self, view: View, spread: float) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
         none."""
         s = self.settings

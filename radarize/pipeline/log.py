@@ -12,7 +12,7 @@ from radarize.io.errors import InputError
 from radarize.io.files import regular
 from radarize.io.npyfile import read_npz
 from radarize.io.tum import planar, planar_poses, read_tum
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
@@ -30,8 +30,7 @@ class Log:
         azimuths: of the beams, rad, positive to the left.
         ranges: m; inf: nothing seen; nan: not known.
         odometry_times, odometry: s; x, y (m) and yaw (rad).
-        covariances: of each motion since the odometry entry before, in the later one's frame; None: not known.
-        claims: how far motions over several entries may be off; None: not known.
+        errors: of the odometry's steps; None: not known.
     """
 
     times: Float[np.ndarray, "scan"]
@@ -39,8 +38,7 @@ class Log:
     ranges: Float[np.ndarray, "scan beam"]
     odometry_times: Float[np.ndarray, "pose"]
     odometry: Float[np.ndarray, "pose 3"]
-    covariances: Float[np.ndarray, "pose 3 3"] | None = None
-    claims: Claims | None = None
+    errors: ErrorModel | None = None
 
     @classmethod
     def read(cls, scans: Path, odometry: Path | None = None) -> "Log":
@@ -55,27 +53,27 @@ class Log:
         Raises:
             InputError: a file or field is missing or is not as described.
         """
-        scans, moved, covariances, claims = Path(scans), odometry and read_tum(odometry), None, None
+        scans, moved, errors = Path(scans), odometry and read_tum(odometry), None
         if scans.is_dir():
             run = RunFolder(scans)
             moved = moved or run.odometry
             if not run.scans:
                 raise InputError(f"{scans}: has no scans.h5, expected a run with scans")
             times, azimuths, ranges = (run.scans[name].astype(float) for name in ("time", "azimuths", "ranges"))
-            covariances, claims = run.scans.get("step_covariance"), run.claims
+            errors = run.errors
         else:
             times, azimuths, ranges = _npz_scans(scans)
         if moved is None:
             return cls(times, azimuths, ranges, np.zeros(0), np.zeros((0, 3)))
         stamps, poses = moved
-        if covariances is not None and len(covariances) != len(stamps):
-            covariances = claims = None  # the odometry is another one
-        return cls(times, azimuths, ranges, stamps, planar(poses), covariances, claims)
+        if errors is not None and len(errors) != len(stamps):
+            errors = None  # the odometry is another one
+        return cls(times, azimuths, ranges, stamps, planar(poses), errors)
 
     def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
         """Give everything to a new session, in order of time, and finish it; `progress` takes scans done and in all."""
-        spreads = self.covariances if self.covariances is not None else [None] * len(self.odometry_times)
-        odometry = deque(zip(self.odometry_times, self.odometry, spreads, strict=True))
+        errors = self.errors if self.errors is not None else [None] * len(self.odometry_times)
+        odometry = deque(zip(self.odometry_times, self.odometry, errors, strict=True))
         for done, i in enumerate(np.argsort(self.times, kind="stable"), 1):
             while odometry and odometry[0][0] <= self.times[i]:
                 slam.add_odometry(*odometry.popleft())

@@ -52,8 +52,7 @@ def make_pipeline(inputs: Inputs, odometry: str, scans: str, endless: bool = Fal
     Raises:
         InputError: unknown name, or see `Method`.
     """
-    extractor = make_scans(inputs, scans)
-    return Pipeline(make_odometry(inputs, odometry), extractor, inputs.configuration.slam, endless)
+    return Pipeline(make_odometry(inputs, odometry), make_scans(inputs, scans), inputs.configuration.slam, endless)
 
 
 def _readable(method: Method, name: str, pictured_method: str, inputs: Inputs) -> Method:

@@ -4,16 +4,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from radarize.io.errors import InputError
 from radarize.io.load import Source, frames_of
-from radarize.io.pose import between
 from radarize.io.recording import Clip
 from radarize.io.trajectory import Trajectory
 from radarize.io.tum import planar_poses
-from radarize.odometry.claims import Claims, Unknown
 from radarize.odometry.integration import Track
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.config import Configuration
 from radarize.pipeline.methods import BEST, ODOMETRY, PICTURED, best_methods, make_odometry, make_scans
 from radarize.pipeline.session import batches, inputs_of
@@ -102,20 +100,8 @@ def trajectory(tracks: list[Track]) -> Trajectory:
     def joined(name: str) -> np.ndarray:
         return np.concatenate([getattr(track, name) for track in tracks])
 
-    names = ("noise", "kept", "held")
-    claims = Claims(*(np.concatenate([getattr(track.claims, name) for track in tracks]) for name in names))
-    pose = joined("pose")
+    pose, errors = joined("pose"), ErrorModel.joined([track.errors for track in tracks])
     return Trajectory(
-        joined("time"), planar_poses(pose), since_start(pose, claims), joined("velocity"),
+        joined("time"), planar_poses(pose), errors.since_start(pose), joined("velocity"),
         joined("velocity_covariance"), name="odometry",
     )  # fmt: skip
-
-
-def since_start(pose: Float[np.ndarray, "frame 3"], claims: Claims) -> Float[np.ndarray, "frame 3 3"]:
-    """Covariance of each pose (x, y in m, yaw in rad) in its own frame, given the first one."""
-    found = np.zeros((len(pose), 3, 3))
-    unknown = Unknown(claims.held[0])
-    for k in range(1, len(pose)):
-        unknown.step(between(pose[k - 1], pose[k]), claims, k)
-        found[k] = unknown.covariance
-    return found

@@ -94,8 +94,8 @@ class Pipeline:
             used = np.isin(batch.centers, track.time)
             ranges = batch.ranges[used]
             with stage("slam"):
-                for time, pose, covariance, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
-                    self.slam.add_odometry(time, pose, covariance)
+                for time, pose, errors, scan in zip(track.time, track.pose, track.errors, ranges, strict=True):
+                    self.slam.add_odometry(time, pose, errors)
                     self.slam.add_scan(time, BEARINGS, scan)
             flaws = None if batch.flaws is None else batch.flaws.of(used)
             return Result(batch.numbers[used], track, ranges.astype(np.float32), flaws)

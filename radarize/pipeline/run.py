@@ -19,7 +19,7 @@ from radarize.io.replacing import Replacement
 from radarize.io.trajectory import Trajectory
 from radarize.io.tum import planar
 from radarize.pipeline.config import Configuration
-from radarize.pipeline.odometry import choose, configuration, folder, since_start
+from radarize.pipeline.odometry import choose, configuration, folder
 from radarize.pipeline.runfolder import OccupancyMap, RunFolder
 from radarize.pipeline.runfolder.reader import FILES
 from radarize.pipeline.session import run_recording
@@ -67,9 +67,9 @@ class Run:
         if (found := self.folder.odometry) is None:
             return None
         time, pose = found
-        scans, claims = self.folder.scans, self.folder.claims
+        scans, errors = self.folder.scans, self.folder.errors
         return Trajectory(
-            time, pose, None if claims is None else since_start(planar(pose), claims), scans.get("velocity"),
+            time, pose, None if errors is None else errors.since_start(planar(pose)), scans.get("velocity"),
             scans.get("velocity_covariance"), name="odometry",
         )  # fmt: skip
 

@@ -12,11 +12,12 @@ from jaxtyping import Float
 
 from radarize.io.errors import InputError
 from radarize.io.pose import Pose, between, carried, compose, interpolate, transform
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.drawing import Drawing
 from radarize.slam.grid import OccupancyGrid
-from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
+from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty, without_prior
 from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
 from radarize.slam.odometry import FARTHEST, Drift, Odometry, Stillness
@@ -83,20 +84,23 @@ class Slam:
         self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
 
     def add_odometry(
-        self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None = None
+        self,
+        time: float,
+        pose: Float[np.ndarray, "3"],
+        errors: ErrorModel | Float[np.ndarray, "3 3"] | None = None,
     ) -> None:
         """Say where odometry puts the sensor.
 
         Args:
             time: s.
             pose: x, y (m), yaw (rad) in any fixed frame.
-            covariance: of the motion since the entry before, for (x, y, yaw) in this pose's frame (m^2, m rad, rad^2);
-                None: as configured in `SlamConfig.odometry`.
+            errors: of the step since the entry before, or its covariance alone if steps are independent, for (x, y,
+                yaw) in this pose's frame (m^2, m rad, rad^2); None: as configured in `SlamConfig.odometry`.
 
         Raises:
             InputError: a value is not finite, or not within `FARTHEST`, or the covariance is none.
         """
-        if self.odometry.add(time, pose, covariance):
+        if self.odometry.add(time, pose, errors):
             self._drain()
         else:
             self.skipped["odometry"] += 1
@@ -271,7 +275,8 @@ class Slam:
             submap.grid, points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
-        self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
+        measured = without_prior(result, prior, covariance)
+        self.graph.add_match(submap.anchor, len(self.nodes), measured, noise)
         return compose(self._local[submap.anchor], result.pose)
 
     def _insert(self, number: int, node: Node) -> None:

@@ -1,14 +1,16 @@
-"""Odometry as a function of time: where it says the sensor was, and how sure it is of a motion."""
+"""Odometry as a function of time: poses, and covariances of motions between any two instants."""
 
 from collections import deque
 from collections.abc import Sequence
+from copy import copy
 from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
 
 from radarize.io.errors import InputError
-from radarize.io.pose import adjoint, between, carried, interpolate
+from radarize.io.pose import adjoint, between, interpolate
+from radarize.odometry.uncertainty import ErrorModel, MotionCovariance
 from radarize.slam.config import OdometryConfig
 from radarize.slam.rows import Rows
 
@@ -20,15 +22,15 @@ class Odometry:
     """Poses in an odometry frame, in order of time.
 
     Args:
-        config: uncertainty of steps that come without covariance.
+        config: uncertainty of steps that come without errors.
         endless: keep no poses but those that motions still need.
     """
 
     def __init__(self, config: OdometryConfig, endless: bool = False):
         self.config, self.endless = config, endless
         self._times, self._poses = Rows(), Rows(3)
-        self._covariances: deque[np.ndarray | None] = deque()  # of the last entries, those that motions still need
-        self._known: tuple[float, float, np.ndarray] | None = None  # start, end and covariance of a motion
+        self._errors: deque[ErrorModel | None] = deque()  # of the last entries, those that motions still need
+        self._known: tuple[float, float, MotionCovariance] | None = None  # start, end and covariance of a motion
 
     def __len__(self) -> int:
         return len(self._times)
@@ -38,34 +40,29 @@ class Odometry:
         """Of the entries, s."""
         return self._times.values
 
-    def add(self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None) -> bool:
-        """Append a pose and the covariance of the motion since the one before; False if it comes too late.
+    def add(
+        self, time: float, pose: Float[np.ndarray, "3"], errors: ErrorModel | Float[np.ndarray, "3 3"] | None
+    ) -> bool:
+        """Append a pose and the errors, or the covariance, of the step since the one before; False if it comes too
+        late.
 
         Raises:
-            InputError: a value is not within `FARTHEST`, or the covariance is not symmetric and positive semidefinite.
+            InputError: a value is not within `FARTHEST`, or a covariance is not symmetric and positive semidefinite.
         """
         pose = np.asarray(pose, float)
         if pose.shape != (3,) or not (np.abs(pose) <= FARTHEST).all() or not np.isfinite(time):
             raise InputError(
                 f"odometry at {time}: pose is {pose}, expected finite time, and x, y, yaw within {FARTHEST:g} m or rad"
             )
-        if covariance is not None:
-            covariance = np.asarray(covariance, float)
-            if covariance.shape != (3, 3) or not (np.abs(covariance) <= FARTHEST**2).all():
-                raise InputError(
-                    f"odometry at {time}: covariance is {covariance.tolist()}, expected a 3 x 3 within {FARTHEST**2:g}"
-                )
-            slack = 1e-6 * np.abs(covariance).max()
-            if np.abs(covariance - covariance.T).max() > slack or np.linalg.eigvalsh(covariance)[0] < -slack:
-                raise InputError(
-                    f"odometry at {time}: covariance is {covariance.tolist()}, "
-                    "expected it symmetric and without negative eigenvalues"
-                )
+        if errors is not None and not isinstance(errors, ErrorModel):
+            errors = ErrorModel.independent(np.asarray(errors, float))
+        if errors is not None:
+            _check(time, errors.noise)
         if len(self) and time <= self.times[-1]:
             return False
         self._times.append(float(time))
         self._poses.append(pose)
-        self._covariances.append(covariance)
+        self._errors.append(errors)
         return True
 
     def covers(self, time: float) -> bool:
@@ -89,48 +86,49 @@ class Odometry:
         Covariances from before a `release` are gone: `start` is its, or later.
         """
         whole = between(self.pose(start), self.pose(end))
-        total = self._sum(start, end)
-        if total is None:
+        errors = self._covariance(start, end)
+        if errors is None:
             return whole, self.model(whole)
         # A floor keeps the graph solvable where the source claims to be perfect (a sensor at rest).
         shared = 1e-4 + self.config.scale * np.hypot(whole[0], whole[1])
-        return whole, total + np.diag([shared, shared, 1e-4]) ** 2
+        return whole, errors.covariance + np.diag([shared, shared, 1e-4]) ** 2
 
     def release(self, start: float, until: float) -> None:
-        """Forget covariances up to `until`, but for their sum since `start` (s); motions are asked for from there, or
-        from `until`, on. Where poses are not kept, neither are those before `start` and between the two."""
-        total = self._sum(start, until) if until > start else None
-        self._known = None if total is None else (start, until, total)
+        """Forget errors up to `until`, but for the covariance of the motion since `start` (s); motions are asked for
+        from there, or from `until`, on. Where poses are not kept, neither are those before `start` and between the
+        two."""
+        errors = self._covariance(start, until) if until > start else None
+        self._known = None if errors is None else (start, until, errors)
         first = int(np.searchsorted(self.times, until))
-        while len(self) - len(self._covariances) < first:
-            self._covariances.popleft()
+        while len(self) - len(self._errors) < first:
+            self._errors.popleft()
         if self.endless:
             after = int(np.searchsorted(self.times, start))
             for low, high in ((after + 1, first - 1), (0, after - 1)):
                 self._times.drop(low, high)
                 self._poses.drop(low, high)
 
-    def _sum(self, start: float, end: float) -> Float[np.ndarray, "3 3"] | None:
-        """Covariance of a motion; None if one of its steps came without.
-
-        Steps are independent: C is that of the way before, carried over the step, and the step's.
-        """
-        times, total = self.times, np.zeros((3, 3))
-        if known := self._known and self._known[0] == start and self._known[1] <= end:
-            start, total = self._known[1:]
+    def _covariance(self, start: float, end: float) -> MotionCovariance | None:
+        """Of a motion; None if one of its steps came without errors. Errors at the start are those of the first entry
+        that is not before it."""
+        times, begun = self.times, None
+        if self._known and self._known[0] == start and self._known[1] <= end:
+            _, start, begun = self._known
         low, high = np.searchsorted(times, (start, end))
-        gone, first, last = len(self) - len(self._covariances), max(low, 1), min(high, len(self) - 1)
-        if first < gone:
+        gone, last = len(self) - len(self._errors), min(high, len(self) - 1)
+        if low < gone:
             return None
-        steps = list(islice(self._covariances, max(first - gone, 0), max(last + 1 - gone, 0)))
-        if not (steps or known) or any(covariance is None for covariance in steps):
+        steps = list(islice(self._errors, max(low - gone, 0), max(last + 1 - gone, 0)))
+        if not (steps or begun) or any(errors is None for errors in steps[not low :]):
             return None
-        for k, covariance in enumerate(steps, first):
-            t0, t1 = times[k - 1], times[k]
-            begin, finish = max(start, t0), min(end, t1)
-            motion = between(self.pose(begin), self.pose(finish))
-            total = carried(total, motion) + (finish - begin) / (t1 - t0) * covariance
-        return total
+        start_errors = steps[0].variance if steps and steps[0] is not None else np.zeros((3, 3))
+        found = copy(begun) if begun is not None else MotionCovariance(start_errors, scale=0.0)
+        for k, errors in enumerate(steps, low):
+            begin, finish = max(start, times[max(k - 1, 0)]), min(end, times[k])
+            if finish > begin:
+                motion = between(self.pose(begin), self.pose(finish))
+                found.step(motion, errors.part((finish - begin) / (times[k] - times[k - 1])))
+        return found
 
     def model(self, step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
         """Covariance of a step from the configured standard deviations."""
@@ -138,6 +136,24 @@ class Odometry:
         translation = np.hypot(c.translation, c.translation_per_metre * distance)
         rotation = np.linalg.norm([c.rotation, c.rotation_per_metre * distance, c.rotation_per_radian * angle])
         return np.diag([translation, translation, rotation]) ** 2
+
+
+def _check(time: float, covariance: Float[np.ndarray, "3 3"]) -> None:
+    """Whether it is one.
+
+    Raises:
+        InputError: it is not.
+    """
+    if covariance.shape != (3, 3) or not (np.abs(covariance) <= FARTHEST**2).all():
+        raise InputError(
+            f"odometry at {time}: covariance is {covariance.tolist()}, expected a 3 x 3 within {FARTHEST**2:g}"
+        )
+    slack = 1e-6 * np.abs(covariance).max()
+    if np.abs(covariance - covariance.T).max() > slack or np.linalg.eigvalsh(covariance)[0] < -slack:
+        raise InputError(
+            f"odometry at {time}: covariance is {covariance.tolist()}, "
+            "expected it symmetric and without negative eigenvalues"
+        )
 
 
 class Drift:

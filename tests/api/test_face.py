@@ -71,6 +71,6 @@ def test_what_is_not_there_is_an_attribute_error():
 
 def test_odometry_stays_a_package():
     """Whatever was imported first."""
-    from radarize.odometry import claims
+    from radarize.odometry import uncertainty
 
-    assert rz.odometry.claims is claims and callable(rz.odometry)
+    assert rz.odometry.uncertainty is uncertainty and callable(rz.odometry)

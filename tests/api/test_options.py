@@ -45,6 +45,8 @@ PAIRS = {
         rz.live,
         {
             **of_fields(NetworkAddresses),
+            "weights": None,
+            "pipeline": None,
             "baud": BAUD,
             "output": None,
             "overwrite": False,

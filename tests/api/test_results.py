@@ -213,7 +213,7 @@ def test_notebooks_show_pictures_and_tables(rec, walk):
         (lambda rec: rz.evaluate(rec.path.parent / "RUN", reference="no.tum"), "no.tum: no such file"),
         (lambda rec: rz.live(), "--config is missing, expected a .cfg or a preset"),
         (lambda rec: rz.live("radarize", port="/dev/nowhere"), "no such serial port"),
-        (lambda rec: rz.live(replay=rec.path, speed=2), "speed is given, expected some of baud"),
+        (lambda rec: rz.live(replay=rec.path, speed=2), "speed is given, expected some of weights, pipeline, baud"),
         (lambda rec: rz.torch_dataset("nowhere"), "nowhere: holds no recordings"),
         (lambda rec: rz.torch_dataset(rec.path.parent, features=["color"]), "fields names 'color'"),
         (lambda rec: radarsim.simulate("castle"), "castle"),

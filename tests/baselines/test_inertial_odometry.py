@@ -11,9 +11,9 @@ from radarize.io.pose import between
 from radarize.io.recording import Recording
 from radarize.io.tum import planar
 from radarize.learning.nets.weights import Header, save
-from radarize.odometry.claims import Claims
 from radarize.odometry.inertial import Imu
 from radarize.odometry.integration import Track
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Inputs, Weights
 from radarize.pipeline.methods import make_odometry
 from tests.baselines.walks_known import CONFIG, RATE, attitude, pose, walk
@@ -46,9 +46,8 @@ def follow(name: str, recording: Recording, weights: Weights, cuts: list[int]) -
         adc, times = recording.adc(first, first + count), recording.times[first : first + count]
         parts.append(follower.update(batch(inputs.signal, adc, times)))
         first += count
-    *arrays, claims = zip(*(vars(part).values() for part in parts), strict=True)
-    joined = (np.concatenate(each) for each in zip(*(vars(part).values() for part in claims), strict=True))
-    return Track(*map(np.concatenate, arrays), Claims(*joined))
+    *arrays, errors = zip(*(vars(part).values() for part in parts), strict=True)
+    return Track(*map(np.concatenate, arrays), ErrorModel.joined(list(errors)))
 
 
 class Truth:
@@ -90,15 +89,15 @@ def test_truth_told_is_truth_followed(name, recording, weights, monkeypatch):
     apart = between(track.pose[45], track.pose[-1]) - between(truth[45], truth[-1])
     assert np.hypot(*apart[:2]) < 0.06 and abs(apart[2]) < 0.02
     assert np.hypot(*track.velocity[late].T) == pytest.approx(2 * RATE, abs=0.15)
-    assert (np.linalg.eigvalsh(track.covariance) > 0)[1:].all()
+    assert (np.linalg.eigvalsh(track.errors.noise) > 0)[1:].all()
     assert attitude(np.zeros(1)).as_euler("ZYX")[0, 0] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("name", ["milliego", "rnin"])
 def test_batches_do_not_matter(name, recording, weights):
     tracks = [follow(name, recording, weights, cuts) for cuts in ([20], [1, 7, 12])]
-    whole, parts = (vars(track) | vars(track.claims) for track in tracks)
-    for field in whole.keys() - {"claims"}:
+    whole, parts = (vars(track) | vars(track.errors) for track in tracks)
+    for field in whole.keys() - {"errors"}:
         assert parts[field] == pytest.approx(whole[field], abs=1e-6), field
 
 

@@ -88,8 +88,8 @@ def test_pipelines_of_one_batch_do_not_disturb_each_other(noise, monkeypatch):
             other = alone.push(preprocessor.process(samples, times + 4 * k * CONFIG.frame_period))
             assert np.array_equal(result.frames, other.frames) and list(other.frames) == [4 * k, 4 * k + 1, 4 * k + 2]
             assert np.array_equal(result.ranges, other.ranges)
-            here, there = (vars(each.track) | vars(each.track.claims) for each in (result, other))
-            for name in here.keys() - {"claims"}:
+            here, there = (vars(each.track) | vars(each.track.errors) for each in (result, other))
+            for name in here.keys() - {"errors"}:
                 assert np.array_equal(here[name], there[name]), name
         assert np.array_equal(pipeline.slam.trajectory()[1], alone.slam.trajectory()[1])
 

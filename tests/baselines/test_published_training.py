@@ -17,7 +17,7 @@ from radarize.cli import app
 from radarize.io.errors import InputError
 from radarize.io.recording import Product, Recording, RecordingWriter, Stream
 from radarize.io.tum import read_tum
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.weights import Header, build, example, header_of, load, save
 from radarize.learning.task import find_task
@@ -156,7 +156,7 @@ def networks(folder, width=2, config=CONFIG, name="published-{}.safetensors"):
     for kind, task in TASKS.items():
         header = Header(
             kind=kind, setting="published", frames=task.defaults.frames, maps=task.maps, width=width,
-            grid=Grid.of(config, task.maps[0], PublishedMaps),
+            grid=MapGrid.of(config, task.maps[0], PublishedMaps),
         )  # fmt: skip
         torch.manual_seed(3)
         net = build(task.network, header)
@@ -169,7 +169,7 @@ def test_sizes():
     """The paper's widths: ResNet18 has 11.2 million parameters, U-Net 31."""
     counts = {}
     for kind, task in TASKS.items():
-        net = task.net(task.defaults, Grid.of(PRESETS["radarize"], task.maps[0], PublishedMaps))
+        net = task.net(task.defaults, MapGrid.of(PRESETS["radarize"], task.maps[0], PublishedMaps))
         counts[kind] = sum(values.numel() for values in net.parameters()) / 1e6
         assert len(task.maps) * task.defaults.frames == {"translation": 2, "rotation": 6, "segmentation": 6}[kind]
     assert counts["translation"] == pytest.approx(11.2, abs=0.1)
@@ -246,12 +246,12 @@ def test_from_data_to_a_run(data, tmp_path):
     for kind in TASKS:
         named = ["train", f"published-{kind}"] if kind == "rotation" else ["train", kind, "--settings", "published"]
         arguments = [*named, "--data", str(data), "--width", "2", "--epochs", "1"]
-        arguments += ["--batch", "4", "-o", str(tmp_path / f"{kind}.safetensors"), "--device", "cpu"]
+        arguments += ["--batch", "4", "-o", str(tmp_path / f"published-{kind}.safetensors"), "--device", "cpu"]
         done = CliRunner().invoke(app, arguments)
         assert done.exit_code == 0, done.output
-        header = load(tmp_path / f"{kind}.safetensors", TASKS[kind].network, CONFIG)[1]
+        header = load(tmp_path / f"published-{kind}.safetensors", TASKS[kind].network, CONFIG)[1]
         assert header.setting == "published" and header.grid.frame_period == pytest.approx(2 / 30, rel=1e-3)
-    assert header_of(tmp_path / "rotation.safetensors").spacings == (1, 2, 3, 4)
+    assert header_of(tmp_path / "published-rotation.safetensors").spacings == (1, 2, 3, 4)
     output = tmp_path / "run"
     arguments = ["run", str(data / "0.h5"), "-o", str(output), "--settings", "published", "--weights", str(tmp_path)]
     done = CliRunner().invoke(app, arguments)

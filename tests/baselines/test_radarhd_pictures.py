@@ -13,7 +13,7 @@ from radarize.baselines.pictures.maps import PictureMaker
 from radarize.baselines.pictures.training import UNKNOWN, chamfer, unpacked
 from radarize.baselines.radarhd.network import DRAWN, SEEN, RadarHdNet, RadarHdPictureNet, columns
 from radarize.baselines.radarhd.pictures import LEAST, known
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.unet import through
 from radarize.learning.nets.weights import load, save
@@ -49,7 +49,7 @@ def repeating(frames: int = 2) -> RadarHdPictureNet:
 def weights(net: RadarHdPictureNet, path: Path) -> Path:
     """Its file, as training writes it."""
     settings = replace(TASK.defaults, width=4, frames=net.frames)
-    return save(net, TASK.header(settings, Grid.of(RADAR, "antennas", PictureMaker)), path)
+    return save(net, TASK.header(settings, MapGrid.of(RADAR, "antennas", PictureMaker)), path)
 
 
 def test_pictures_become_pictures_of_the_same_half_circle(tmp_path):
@@ -114,7 +114,7 @@ def table(rows: list[float], frames: int = 5) -> FeatureTable:
     for each, row in zip(lidar, rows, strict=True):
         each[:, int(row), 200:312] = True
     packed = torch.from_numpy(np.packbits(lidar, axis=3)).flatten(0, 1)
-    grid = Grid.of(RADAR, "antennas", PictureMaker)
+    grid = MapGrid.of(RADAR, "antennas", PictureMaker)
     return FeatureTable({"antennas": antennas}, {"lidar": packed}, [frames] * len(rows), grid, 0.2)
 
 

@@ -42,7 +42,9 @@ def test_follows_walls(way):
     assert abs(np.rad2deg(between(poses[0], poses[-1])[2] - pose[-1, 2])) < 2
     straight = slice(40, 150)
     assert np.abs(rate[straight] - [0.025 / CONFIG.frame_period, 0]).mean() < 0.05
-    step, spread = (np.concatenate([getattr(part, name) for part in parts]) for name in ("step", "covariance"))
+    step, spread = (
+        np.concatenate(each) for each in zip(*((part.step, part.errors.noise) for part in parts), strict=True)
+    )
     wrong = step[1:] - between(poses[:-1], poses[1:])
     normalised = (wrong[:, None] @ np.linalg.solve(spread[1:], wrong[:, :, None])).mean() / 3
     assert normalised < 2
@@ -62,7 +64,7 @@ def test_rates_of_turning_are_believed_where_nothing_is_seen(way):
     sure, unsure = track(0.01), track(1000.0)
     assert abs(sure.pose[-1, 2] - 0.4 * times[-1]) < 0.02 * 0.4 * times[-1]
     assert abs(unsure.pose[-1, 2]) < 0.3 * 0.4 * times[-1]
-    assert sure.covariance[-1, 2, 2] < 1e-2 * unsure.covariance[-1, 2, 2]
+    assert sure.errors.noise[-1, 2, 2] < 1e-2 * unsure.errors.noise[-1, 2, 2]
 
 
 def test_batches_do_not_matter(way):
@@ -80,7 +82,7 @@ def test_nothing_to_see_keeps_the_motion(way):
     before = matching.update(of_scans(SIGNAL, scans[:100], times[:100]))
     blind = matching.update(of_scans(SIGNAL, np.full_like(scans[100:115], np.inf), times[100:115]))
     assert np.allclose(blind.velocity, before.velocity[-1])
-    assert blind.covariance[-1, 0, 0] > before.covariance[-1, 0, 0]
+    assert blind.errors.noise[-1, 0, 0] > before.errors.noise[-1, 0, 0]
     assert np.allclose(between(before.pose[-1], blind.pose[-1])[:2], [15 * 0.025, 0], atol=0.05)
 
 

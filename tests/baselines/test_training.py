@@ -14,7 +14,7 @@ from radarize.baselines.rnin.network import RninNet
 from radarize.baselines.rnin.training import displaced, rotation
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording, RecordingWriter, Stream
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.export import export_onnx
 from radarize.learning.nets.weights import Header, build, example, load, save
@@ -29,7 +29,7 @@ from tests.baselines.walks_known import CONFIG, walk
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 ROWS, PERIOD = 16, 1 / 15
-GRID = Grid(rows=ROWS, step=0.2, azimuths=80, field=float(AZIMUTHS[-1] - AZIMUTHS[0]), frame_period=PERIOD)
+GRID = MapGrid(rows=ROWS, step=0.2, azimuths=80, field=float(AZIMUTHS[-1] - AZIMUTHS[0]), frame_period=PERIOD)
 TASKS = {kind: find_task(kind) for kind in ("radarhd", "milliego", "rnin")}
 QUICK = {
     "radarhd": replace(TASKS["radarhd"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-3),
@@ -160,7 +160,7 @@ def test_ranges_of_another_radar_are_bins_of_the_networks_grid(tmp_path):
     with RecordingWriter(tmp_path / "a.h5", CONFIG, streams={"truth/scan": Stream((4,), "f4", "m", "")}) as writer:
         samples = np.random.default_rng(0).normal(0, 100, (1, *CONFIG.frame_shape)).astype(np.int16)
         writer.append(samples, np.zeros(1), rows={"truth/scan": scan})
-    grid = Grid.of(CONFIG, "range_azimuth").model_copy(update={"step": step, "rows": int(2.5 / step)})
+    grid = MapGrid.of(CONFIG, "range_azimuth").model_copy(update={"step": step, "rows": int(2.5 / step)})
     table = FeatureTable.read([tmp_path / "a.h5"], ["range_azimuth"], task.truth, grid=grid)
     assert table.maps["range_azimuth"].shape[1] == grid.rows
     assert table.truth["scan"].numpy() == pytest.approx(np.array([[0.5 / step, 1.5 / step, -1, -1]]))

@@ -1,9 +1,9 @@
 """Clocks of a radar and a lidar beside it."""
 
-from pathlib import lzma
+import lzma
+from pathlib import Path
 
 import numpy as np
-import Path
 import pytest
 
 from radarize.baselines.walks.clock import Clock

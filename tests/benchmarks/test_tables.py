@@ -46,10 +46,10 @@ def test_frames_of_a_run_tell_what_its_metrics_tell(judged):
     steps, _ = followed.turned(0)
     assert len(steps) == len(followed.velocity) - 1
     path = np.cumsum([0, *steps])
-    windows, claims = followed.turned(8 * followed.period)
+    windows, variance = followed.turned(8 * followed.period)
     np.testing.assert_allclose(windows, path[8:] - path[:-8], atol=1e-6)
-    at_once = followed.claims.motions(followed.poses, np.arange(len(claims)), 8)[:, 2, 2]
-    np.testing.assert_allclose(claims, at_once, rtol=1e-6)
+    at_once = followed.errors.motions(followed.poses, np.arange(len(variance)), 8)[:, 2, 2]
+    np.testing.assert_allclose(variance, at_once, rtol=1e-6)
     assert found["quantiles"]["odometry"][-1] == pytest.approx(found["odometry"]["ate"]["position"]["max"], abs=1e-4)
 
 

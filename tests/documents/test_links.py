@@ -9,7 +9,7 @@ import yaml
 ROOT = Path(__file__).parents[2]
 PAGES = [
     *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks" / "results").glob("*.md"),
-    ROOT / "radarize" / "weights" / "README.md",
+    ROOT / "radarize" / "learning" / "weights" / "README.md",
 ]  # fmt: skip
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)

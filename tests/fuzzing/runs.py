@@ -10,7 +10,7 @@ from hypothesis.strategies import SearchStrategy
 
 import radarize.io.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.evaluation.evaluate import evaluate
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.nets.motion import RotationNet
 from radarize.learning.nets.weights import Header, build, save
 from radarize.learning.nets.weights import load as load_weights
@@ -93,7 +93,7 @@ def weights() -> Reader:
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "a.safetensors"
         for width in (2, 4):
-            grid = Grid.of(PRESETS["radarize"], "range_azimuth")
+            grid = MapGrid.of(PRESETS["radarize"], "range_azimuth")
             header = Header(kind="rotation", frames=2, maps=("range_azimuth",), width=width, grid=grid)
             seeds.append(save(build(RotationNet, header), header, path).read_bytes())
         _shown(path)  # what is imported and compiled at first use is no input's time

@@ -7,8 +7,8 @@ import torch
 from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
-from radarize.odometry.gaussian import Gaussian
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
+from radarize.odometry.smoother import Gaussian
 from radarize.radar.presets import PRESETS
 from radarize.signal.batch import Signal
 from radarize.signal.heatmaps import Heatmaps

@@ -10,8 +10,9 @@ from scipy.signal import lfilter
 from radarize.io.errors import InputError
 from radarize.io.pose import between, compose, exponential
 from radarize.odometry.doppler import DopplerVelocity, Velocities
-from radarize.odometry.integration import Odometry, VelocityConfig, VelocityFilter
+from radarize.odometry.integration import LASTING, Odometry, Track, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.odometry.uncertainty import SCALE, ErrorModel
 from radarize.radar.presets import PRESETS
 from radarize.signal.batch import Signal
 from tests.batches import batch, of_spectrum
@@ -26,6 +27,11 @@ def classical(velocity=None, rotation=None) -> Odometry:
     """Least squares and a local map, unless told otherwise."""
     heatmaps = SIGNAL.heatmaps
     return Odometry(CONFIG, velocity or DopplerVelocity(heatmaps), rotation or MapRotation(heatmaps))
+
+
+def steps(track: Track) -> np.ndarray:
+    """Covariances of the motions from frame to frame."""
+    return track.errors.motions(track.pose, np.arange(len(track.pose) - 1), 1)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +71,8 @@ def test_walk(walked, track):
 def test_covariance_of_steps(walked, track):
     truth = walked[2]
     step = np.concatenate([t.step for t in track])[1:]
-    covariance = np.concatenate([t.covariance for t in track])[1:]
+    poses, errors = np.concatenate([t.pose for t in track]), ErrorModel.joined([t.errors for t in track])
+    covariance = errors.motions(poses, np.arange(len(step)), 1)
     relative = np.diff(truth, axis=0)
     c, s = np.cos(truth[:-1, 2]), np.sin(truth[:-1, 2])
     x, y = relative[:, 0].copy(), relative[:, 1].copy()
@@ -117,9 +124,10 @@ def test_lost_frames_are_bridged(walked):
     adc[40:43], valid[40:43] = 0, False
     adc[60, 10:20], valid[60, 10:20] = 0, False
     result = classical().update(batch(SIGNAL, adc, stamps[:80], valid))
-    assert np.isfinite(result.pose).all() and np.isfinite(result.covariance).all()
+    assert np.isfinite(result.pose).all() and np.isfinite(steps(result)).all()
     assert np.linalg.norm(result.pose[-1, :2] - truth[79, :2]) < 0.06
-    assert result.covariance[42, 2, 2] > 2 * result.covariance[39, 2, 2]
+    turns = result.errors.turns(1)
+    assert turns[39] > 2 * turns[38]  # frames 40 to 42 are no entries
 
 
 def test_times_must_ascend(walked):
@@ -179,7 +187,7 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
     result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).update(batch(SIGNAL, adc, stamps))
     # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
-    assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)
+    assert np.sqrt(result.errors.turns(30)[0]) > np.radians(15)
 
 
 class Told:
@@ -221,9 +229,9 @@ def test_the_antennas_swing_about_the_origin():
 
 @pytest.mark.parametrize("period", [1 / 30, 0.1])
 def test_errors_that_last_add_up_to_what_is_claimed(period):
-    """Velocities wrong by 1 cm/s (RMS) as claimed, for a quarter of a second: places over two seconds and more."""
+    """Velocities wrong by 1 cm/s (RMS) as modelled, for as long as modelled: places over two seconds and more."""
     rng, size, frames = np.random.default_rng(3), 0.01, round(900 / period)
-    kept = np.exp(-period / 0.25)
+    kept = np.exp(-period / LASTING)
     drawn = np.sqrt(1 - kept**2) * rng.normal(size=(frames, 2))
     wrong = size * lfilter([1.0], [1.0, -kept], drawn, axis=0)
     told, heading = Told(variance=size**2).velocity(), Told().rotation()
@@ -234,8 +242,9 @@ def test_errors_that_last_add_up_to_what_is_claimed(period):
     for span in (2.0, 10.0):
         each = round(span / period)
         ends = found.pose[::each, :2] - np.outer(times[::each], [1.0, 0.0])
-        claimed = np.add.reduceat(found.covariance[1:, 0, 0], np.arange(0, frames - 1, each))[: len(ends) - 1]
-        assert np.mean(np.diff(ends, axis=0) ** 2 / claimed[:, None]) == pytest.approx(1, abs=0.3)
+        along = found.errors.motions(found.pose, np.arange(len(ends) - 1) * each, each)[:, 0, 0]
+        along -= (SCALE * span) ** 2  # at 1 m/s; nothing is wrong with the scale here, nor with the heading
+        assert np.mean(np.diff(ends, axis=0) ** 2 / along[:, None]) == pytest.approx(1, abs=0.3)
 
 
 @pytest.mark.parametrize("gap", [0.2, 0.5, 1.0, 2.0])
@@ -243,7 +252,7 @@ def test_a_gap_is_claimed_by_its_length(gap):
     """As much as walks by hand change their speed meanwhile; within it, no step claims more than its velocities'."""
     times = np.concatenate([np.arange(10) * CONFIG.frame_period, 9 * CONFIG.frame_period + gap * np.array([1.0])])
     found = Odometry(CONFIG, Told().velocity(), Told().rotation()).update(of_spectrum(SIGNAL, times, times))
-    spread = np.sqrt(found.covariance[:, 0, 0])
+    spread = np.sqrt(np.insert(steps(found)[:, 0, 0], 0, 0.0))
     by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
     assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)
     assert (spread[1:10] < 2e-4).all()
@@ -261,7 +270,7 @@ def test_an_unknown_turn_leaves_the_direction_unknown():
         found.append(Odometry(CONFIG, Told().velocity(), rotation).update(of_spectrum(SIGNAL, times, times)))
     otherwise = [exponential(np.array([1.0, 0.0]), told + sigma * draw) for draw in draws]
     scatter = np.cov(np.stack([between(found[0].step[1], each) for each in otherwise]).T)
-    assert np.abs(found[1].covariance[1] - found[0].covariance[1] - scatter).max() < 0.15 * scatter[1, 2]
+    assert np.abs(steps(found[1])[0] - steps(found[0])[0] - scatter).max() < 0.15 * scatter[1, 2]
 
 
 @pytest.mark.parametrize("rate", [5, 15, 30])

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from radarize.io.errors import InputError
-from radarize.learning.features.grid import Grid, Resampling
+from radarize.learning.features.grid import MapGrid, Resampling
 from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.weights import Header, build, example, load, save
 from radarize.odometry.doppler import Velocities
@@ -30,7 +30,7 @@ def weights(folder, kind: str, **about):
     """An untrained network for frames at half the preset's rate."""
     maps = MAPS[kind]
     fields = {"spacings": (1, 2, 3, 4)} if kind == "rotation" else {}
-    header = Header(kind=kind, frames=2, maps=maps, width=2, grid=Grid.of(SLOW, maps[0]), **(fields | about))
+    header = Header(kind=kind, frames=2, maps=maps, width=2, grid=MapGrid.of(SLOW, maps[0]), **(fields | about))
     torch.manual_seed(0)
     net = build(NETS[kind], header)
     net(*example(net, header))
@@ -85,7 +85,7 @@ def test_maps_of_other_chirps_are_shown_on_the_known_grid(tmp_path):
     made = signal.maker.of(noise, MAPS["translation"])
     (shown,) = header.windows(fine, MapMaker).push(made, fine.frame_period * np.arange(3))
     assert shown.maps.shape == (3, 2, 2, CONFIG.loops, 80)
-    resampling = Resampling(header.grid, Grid.of(fine, "doppler_azimuth"), centred=True)
+    resampling = Resampling(header.grid, MapGrid.of(fine, "doppler_azimuth"), centred=True)
     both = torch.stack([torch.from_numpy(made[name]) for name in MAPS["translation"]], dim=1).float()
     assert torch.equal(shown.maps[:, -1], resampling(both))
 
@@ -172,7 +172,7 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path):
         found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
         error = np.cumsum(found.yaw)[-1] - (truth[-1] - truth[0])
         ends.append(error)
-        honest.append(error**2 / found.variance.sum())
+        honest.append(error**2 / found.noise.sum())
         chained.append(np.sqrt(count / (stride * 4)) * noise * rng.normal())
     assert np.std(ends) < np.std(chained)
     assert 0.3 < np.mean(honest) < 1.2  # below 1, for it began without knowing its rate
@@ -188,7 +188,7 @@ def test_errors_that_are_alike_add_up(tmp_path):
         rotation._net = Oracle(times, 0.98 * np.radians(60) * times, noise, np.random.default_rng(0))
         found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
         error = found.yaw.sum() - np.radians(60) * (times[-1] - times[0])
-        claims.append(error**2 / found.variance[4:].sum())
+        claims.append(error**2 / found.noise[4:].sum())
     assert claims[0] / claims[1] == pytest.approx(4) and claims[0] > 4
 
 
@@ -201,7 +201,7 @@ def test_a_second_lost_while_turning_is_not_asked_about(tmp_path, rate):
     rotation._net = Oracle(times, rate * times, np.radians(0.5), np.random.default_rng(0))
     found = rotation.estimate(numbered(np.arange(120), times), nowhere(120))
     over = rate * (times[60] - times[59])
-    spread = np.sqrt(found.variance[60])
+    spread = np.sqrt(found.noise[60])
     assert abs(found.yaw[60] - over) < 3 * spread and np.radians(20) < spread < np.radians(60)
     assert np.degrees(found.yaw[60]) == pytest.approx(np.degrees(over), abs=25)
     assert not found.seen[60:62].any() and found.seen[2:60].all() and found.seen[62:].all()

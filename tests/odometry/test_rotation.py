@@ -8,10 +8,10 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from radarize.io.pose import wrap
 from radarize.odometry.bearings import YAW
-from radarize.odometry.claims import Claims
 from radarize.odometry.doppler import Velocities
-from radarize.odometry.localmap import LocalMap, MapView
+from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.radar.presets import PRESETS
 from radarize.signal.batch import Signal
 from tests.batches import of_spectrum
@@ -85,12 +85,20 @@ def test_an_array_that_reads_bearings_too_small_turns_as_far():
     assert turned[0] == pytest.approx(1, abs=0.004) and turned[1] < 0.987
 
 
+def errors_of(found: Rotations) -> ErrorModel:
+    """Errors of turns alone."""
+    frames = len(found.yaw)
+    yaw, heading = np.diag([0.0, 0.0, 1.0]), np.diag([1.0, 0.0, 0.0])
+    noise, variance = found.noise[:, None, None] * yaw, found.variance[:, None, None] * heading
+    return ErrorModel(np.full(frames, 1 / 30), noise, np.column_stack([found.correlation, np.zeros(frames)]), variance)
+
+
 @pytest.mark.parametrize("seconds", [15, 86_400])
 def test_seconds_lost_leave_the_map(seconds):
     """At 1.2 m/s dead reckoning is 18 m from a map that reaches 6: it starts anew, and the turn is unknown."""
     times = np.concatenate([np.arange(15), np.arange(15) + 15 + 30 * seconds]) / 30
     found = follow(times, np.stack([1.2 * times, np.zeros(30), np.zeros(30)], axis=1))
-    assert not found.seen[15] and np.sqrt(found.variance[15]) > np.radians(90)
+    assert not found.seen[15] and np.sqrt(errors_of(found).turns(1)[14]) > np.radians(90)
     after = slice(17, None)
     assert found.seen[after].all()
     assert np.degrees(np.abs(np.cumsum(found.yaw[after]))).max() < 1.5
@@ -123,7 +131,7 @@ def test_the_search_goes_as_far_as_the_prior_is_unsure():
     yaw = np.cumsum(turn)
     found = follow(times, np.stack([np.zeros(40), np.zeros(40), yaw], axis=1), Unsure(turn, 20))
     assert np.degrees(found.yaw[20]) == pytest.approx(35, abs=1.5)
-    assert found.seen[20] and found.variance[20] < np.radians(5) ** 2
+    assert found.seen[20] and errors_of(found).turns(1)[19] < np.radians(5) ** 2
 
 
 @pytest.mark.parametrize("off", np.radians([-30, 0, 30]))
@@ -137,7 +145,7 @@ def test_a_second_lost_in_a_bend(off):
     turn[30], claimed[30], seen[30] = turn[30] + off, np.radians(41) ** 2, False
     found = follow(times, poses, SimpleNamespace(estimate=lambda *_: Rotations.independent(turn, claimed, seen)))
     assert np.degrees(found.yaw[30:33].sum() - (yaw[32] - yaw[29])) == pytest.approx(0, abs=2)
-    assert found.seen[30] and found.variance[30] < np.radians(5) ** 2
+    assert found.seen[30] and errors_of(found).turns(1)[29] < np.radians(5) ** 2
 
 
 @pytest.mark.parametrize("rate", [5, 15, 30])
@@ -150,7 +158,8 @@ def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
     found = rotation.estimate(of_spectrum(SIGNAL, np.arange(count), np.arange(count) / rate), nothing)
     s = rotation.settings
     assert not found.seen[1:].any()
-    assert found.variance.sum() == pytest.approx(np.radians(5) ** 2 + s.wander**2 / 3 + s.unseen**2, rel=1e-6)
+    (variance,) = errors_of(found).turns(count - 1)
+    assert variance == pytest.approx(np.radians(5) ** 2 + s.wander**2 / 3 + s.unseen**2, rel=1e-6)
 
 
 def test_what_a_network_makes_of_nothing_is_no_sight():
@@ -158,7 +167,7 @@ def test_what_a_network_makes_of_nothing_is_no_sight():
     rotation = sightless(prior=Unsure(np.zeros(31), 0))
     found = rotation.estimate(of_spectrum(SIGNAL, np.arange(31), np.arange(31) / 30), standing(31))
     assert not found.seen[1:].any()
-    assert np.sqrt(found.variance.sum()) > rotation.settings.unseen
+    assert np.sqrt(errors_of(found).turns(30)[0]) > rotation.settings.unseen
 
 
 @pytest.mark.parametrize("rate", [10, 30])
@@ -193,22 +202,23 @@ def test_a_correction_claims_what_it_takes_back():
     found = rotation.estimate(of_spectrum(SIGNAL, np.arange(frames), np.arange(frames) / 30), standing(frames))
     told = found.seen & (np.arange(frames) > 0)  # and the radar never turned
     assert told.sum() == 149
-    assert np.mean(found.yaw[told] ** 2 / found.variance[told]) == pytest.approx(1, abs=0.25)
+    errors = errors_of(found)
+    steps = errors.turns(1)
+    assert np.mean(found.yaw[told] ** 2 / steps[told[1:]]) == pytest.approx(1, abs=0.25)
     # A turn over any time is off by the difference of the errors at its ends.
-    claims = Claims(found.noise[:, None, None] * np.diag([1.0, 1.0, 1.0]), found.kept, found.held)
     heading = np.cumsum(found.yaw)
     for length in (1, 5, 40):
         starts = np.arange(100, frames - length)
-        claimed = claims.motions(np.zeros((frames, 3)), starts, length)[:, 2, 2]
+        claimed = errors.turns(length)[starts]
         assert np.mean((heading[starts + length] - heading[starts]) ** 2 / claimed) == pytest.approx(1, abs=0.2)
-    assert claimed.mean() < found.variance[200:240].sum() / 4
+    assert claimed.mean() < steps[199:239].sum() / 4
 
 
 def test_a_map_that_is_left_behind_is_empty():
     rng = np.random.default_rng(3)
     ranges, sines = np.arange(0.2, 4, 0.045), np.linspace(-0.85, 0.85, 69)
     feature = rng.normal(size=(len(ranges), len(sines))).astype(np.float32)
-    view = MapView(feature, ranges, sines)
+    view = View(feature, ranges, sines)
     grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
     grid.blend(view, np.zeros(2), 0.0, 0.05)
     assert grid.correlate(view, np.zeros((1, 2)), yaws)[0][0] > 0.5

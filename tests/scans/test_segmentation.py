@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from radarize.io.recording import Recording
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.nets.segmentation import SegmentationNet
 from radarize.learning.nets.weights import Header, build, example, save
 from radarize.pipeline.method import Inputs
@@ -89,7 +89,7 @@ def untrained(tmp_path):
     """Weights that say nothing."""
     header = Header(
         kind="segmentation", frames=1, maps=("range_azimuth", "elevation_aware"), width=2,
-        grid=Grid.of(CONFIG, "range_azimuth"),
+        grid=MapGrid.of(CONFIG, "range_azimuth"),
     )  # fmt: skip
     net = build(SegmentationNet, header)
     net(*example(net, header))

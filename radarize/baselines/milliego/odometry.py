@@ -11,7 +11,7 @@ from radarize.io.stopwatch import stage
 from radarize.learning.features.windows import spaced
 from radarize.odometry.displacements import joined
 from radarize.odometry.integration import Track, intervals
-from radarize.odometry.ties import Ties
+from radarize.odometry.smoother import FixedLagSmoother
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
 
@@ -27,7 +27,7 @@ class MilliEgoOdometry(InertialOdometry):
     def __init__(self, inputs: Inputs):
         super().__init__(inputs)
         self._period, self._frames = inputs.radar.frame_period, self.header.frames
-        self._yaw = Ties(self.path.reach + 1, _TWIST, _FASTEST_TURN)
+        self._yaw = FixedLagSmoother(self.path.reach + 1, _TWIST, _FASTEST_TURN)
         self._past: tuple[np.ndarray, np.ndarray] | None = None  # stamps and panoramas
 
     @torch.inference_mode()
@@ -60,9 +60,9 @@ class MilliEgoOdometry(InertialOdometry):
     def _next(self, time: float, dt: float, motion: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, ...]:
         back = self.path.arrive(time)
         self._yaw.predict(dt)
-        self._yaw.tie(back, motion[2], self.path.reach * covariance[2, 2])
+        self._yaw.add_relative_motion(back, motion[2], self.path.reach * covariance[2, 2])
         older = compose(np.array([0, 0, self._yaw.values[-1 - back]]), np.array([*motion[:2], 0]))
-        return self.path.next(dt, back, older[:2], covariance, self._yaw.values[-1], self._yaw.variance(1))
+        return self.path.next(dt, back, older[:2], covariance, self._yaw.values[-1], self._yaw.since(1))
 
 
 METHOD = Method("milliEgo", MilliEgoOdometry, ("milliego",))

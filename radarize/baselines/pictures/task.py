@@ -5,7 +5,7 @@ from typing import Any
 from torch import Tensor
 
 from radarize.baselines.pictures.maps import PictureMaker
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.nets.weights import Header
 from radarize.learning.task import Settings, Task
 from radarize.radar.presets import PRESETS
@@ -16,9 +16,9 @@ class PictureTask(Task[Tensor]):
 
     maps, reads = ("antennas",), ("picture",)
 
-    def header(self, settings: Settings, grid: Grid | None, **about: Any) -> Header:
+    def header(self, settings: Settings, grid: MapGrid | None, **about: Any) -> Header:
         """Of pictures, which come as often as what they are made of."""
         if grid is not None:
-            picture = Grid.of(PRESETS["radarhd"], "picture", PictureMaker)
+            picture = MapGrid.of(PRESETS["radarhd"], "picture", PictureMaker)
             grid = picture.model_copy(update={"frame_period": grid.frame_period})
         return super().header(settings, grid, **about)

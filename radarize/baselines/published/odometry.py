@@ -8,8 +8,8 @@ from radarize.baselines.published.maps import PublishedStream
 from radarize.io.pose import between, wrap
 from radarize.io.stopwatch import stage
 from radarize.learning.nets.weights import Network
-from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.signal.batch import Batch
 
 #: Frames of 15 Hz over which turns are told, and so interleaved chains of yaws.
@@ -100,6 +100,5 @@ def _track(
 ) -> Track:
     """The artefact always takes velocity and turn for seen, and steps for independent."""
     velocity_seen, turn_seen = np.ones((2, len(times)), bool)
-    return Track(
-        times, poses, steps, spreads, velocity, velocity_spread, velocity_seen, turn_seen, Claims.independent(spreads)
-    )
+    errors = ErrorModel.independent(spreads)
+    return Track(times, poses, steps, velocity, velocity_spread, velocity_seen, turn_seen, errors)

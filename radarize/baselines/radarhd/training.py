@@ -11,7 +11,7 @@ from torch.nn.functional import adaptive_max_pool2d, binary_cross_entropy_with_l
 from radarize.baselines.radarhd.network import DRAWN, RadarHdNet, columns
 from radarize.io.recording import Recording
 from radarize.learning.features import augment
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import Reading
 from radarize.learning.nets.weights import Network
 from radarize.learning.task import Settings, Task, first_cell
@@ -26,7 +26,9 @@ def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearin
     return np.where(np.isinf(found), -1, found).astype(np.float32)
 
 
-def on_grid(label: Float[np.ndarray, "frame bearing"], own: Grid, known: Grid) -> Float[np.ndarray, "frame bearing"]:
+def on_grid(
+    label: Float[np.ndarray, "frame bearing"], own: MapGrid, known: MapGrid
+) -> Float[np.ndarray, "frame bearing"]:
     """Range bins of one radar as those of a grid, -1 beyond its last one."""
     found = label * np.float32(own.step / known.step)
     return np.where((label < 0) | (found > known.rows - 0.5), np.float32(-1), found)

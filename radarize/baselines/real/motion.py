@@ -20,6 +20,7 @@ from radarize.io.alignment import trajectory
 from radarize.io.errors import InputError
 from radarize.io.pose import between, compose, transform, wrap
 from radarize.io.tum import planar_poses
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Inputs, Weights
 from radarize.radar.presets import PRESETS
 from radarize.signal import polar
@@ -106,8 +107,8 @@ def disturbed(
 
 def followed(
     ranges: Float[np.ndarray, "frame bearing"], rates: Float[np.ndarray, "frame 2"] | None
-) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 3 3"]]:
-    """Poses by matching scans alone, and the covariance of each step.
+) -> tuple[Float[np.ndarray, "frame 3"], ErrorModel]:
+    """Poses by matching scans alone, and the errors of their steps.
 
     Args:
         ranges: scans on `BEARINGS`, m.
@@ -118,7 +119,7 @@ def followed(
     batch.ranges = np.where(np.isnan(ranges), np.inf, ranges)
     matching = ScanMatching(rates=told, bearings=BEARINGS)
     track = matching.update(batch)
-    return track.pose, track.covariance
+    return track.pose, track.errors
 
 
 def network_rates(weights: Weights, pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame 2"]:
@@ -139,7 +140,7 @@ def mapped(
     poses: Float[np.ndarray, "frame 3"],
     surface: Float[np.ndarray, "point 2"],
     odometry: Float[np.ndarray, "frame 3"],
-    covariance: Float[np.ndarray, "frame 3 3"],
+    errors: ErrorModel | Float[np.ndarray, "frame 3 3"],
 ) -> dict[str, float]:
     """SLAM with scans: error of its trajectory, and its map against the lidar's.
 
@@ -148,11 +149,11 @@ def mapped(
         poses: true ones.
         surface: of the lidar's map, m, in the frame of the poses.
         odometry: that SLAM is given.
-        covariance: of its steps.
+        errors: of its steps, or their covariances.
     """
     slam = Slam(_CONFIG)
     for frame in range(len(ranges)):
-        slam.add_odometry(PERIOD * frame, odometry[frame], covariance[frame])
+        slam.add_odometry(PERIOD * frame, odometry[frame], errors[frame])
         slam.add_scan(PERIOD * frame, BEARINGS, ranges[frame])
     slam.finish()
     times, found = slam.trajectory()

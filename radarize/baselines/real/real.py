@@ -211,8 +211,8 @@ def _maps(
     off, rows = drift(odometry, poses), []
     for name, each in judged.ranges.items():
         ranges = each[there]
-        matched, covariance = followed(ranges, rates[there] if name == "network" and rates is not None else None)
-        alone = mapped(ranges, poses, surface, matched, covariance)
+        matched, errors = followed(ranges, rates[there] if name == "network" and rates is not None else None)
+        alone = mapped(ranges, poses, surface, matched, errors)
         rows.append(
             {"walk": walk.number, "method": name, "odometry_ate_m": off}
             | mapped(ranges, poses, surface, odometry, claimed)

@@ -8,9 +8,9 @@ from jaxtyping import Float
 
 from radarize.io.pose import between, compose, exponential, transform
 from radarize.io.stopwatch import stage
-from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track, intervals
-from radarize.odometry.ties import wandered
+from radarize.odometry.smoother import wandered
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
 from radarize.signal.bearings import BEARINGS
@@ -68,8 +68,8 @@ class ScanMatching:
                 poses[i], rates[i], spreads[i] = self._pose, self._rate, self._spread[3:, 3:]
                 moved[i] = between(before, self._pose)
         spread = spreads * steps[:, None, None] ** 2
-        claims = Claims.independent(spread)
-        return Track(centers, poses, moved, spread, rates[:, :2], spreads[:, :2, :2], seen, seen, claims)
+        errors = ErrorModel.independent(spread)
+        return Track(centers, poses, moved, rates[:, :2], spreads[:, :2, :2], seen, seen, errors)
 
     def _step(self, scan: Scan, dt: float, turning: Float[np.ndarray, "2"]) -> bool:
         """Move on to the next scan, and to a rate of turning with its variance; whether there are points to match."""

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from radarize.evaluation.motion import turn_errors
 from radarize.io.pose import Pose, wrap
 from radarize.io.tum import planar
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.runfolder import RunFolder
 
 
@@ -22,7 +22,7 @@ class FrameErrors:
     Attributes:
         velocity, true_velocity: m/s, sensor frame; covariance: claimed, m^2/s^2.
         poses: by odometry; true_yaw: rad.
-        claims: of their motions.
+        errors: of their steps.
         period: s, from frame to frame.
     """
 
@@ -31,7 +31,7 @@ class FrameErrors:
     true_velocity: Float[np.ndarray, "frame 2"]
     poses: Pose
     true_yaw: Float[np.ndarray, "frame"]
-    claims: Claims
+    errors: ErrorModel
     period: float
 
     @classmethod
@@ -42,7 +42,7 @@ class FrameErrors:
             InputError: a damaged file.
         """
         folder = RunFolder(run)
-        assert folder.odometry is not None and folder.claims is not None  # every method of odometry leaves both
+        assert folder.odometry is not None and folder.errors is not None  # every method of odometry leaves both
         scans, (times, poses) = folder.scans, folder.odometry
         return cls(
             scans["velocity"],
@@ -50,7 +50,7 @@ class FrameErrors:
             scans["truth/velocity"][:, :2],
             planar(poses),
             true_poses(folder)[:, 2],
-            folder.claims,
+            folder.errors,
             float(np.median(np.diff(times))),
         )
 
@@ -58,7 +58,7 @@ class FrameErrors:
         """Errors of the yaw over all windows of a span (one frame at least), rad, and their claimed variance, rad^2."""
         window = max(round(seconds / self.period), 1)
         turns = wrap(np.diff(self.poses[:, 2], prepend=0.0))
-        return turn_errors(turns, self.true_yaw, window), self.claims.turns(window)
+        return turn_errors(turns, self.true_yaw, window), self.errors.turns(window)
 
 
 def true_poses(run: RunFolder) -> Pose:
@@ -70,7 +70,7 @@ def true_poses(run: RunFolder) -> Pose:
 
 def joined(found: Sequence[FrameErrors]) -> dict[str, np.ndarray]:
     """Frames of several recordings, one after the other, by attribute."""
-    names = [each.name for each in fields(FrameErrors) if each.name not in ("claims", "period")]
+    names = [each.name for each in fields(FrameErrors) if each.name not in ("errors", "period")]
     return {name: np.concatenate([getattr(one, name) for one in found]) for name in names}
 
 

@@ -50,8 +50,8 @@ HORIZONS = (0, 4 / 15, 1, 5, 15, 40)
 CLAIMS = (
     "NEES: squared error over the claimed variance, per dimension, 1 if that is right, of all frames (no mean over "
     "recordings); median: over its expectation.",
-    "Turns over any time: what methods claim of errors of headings that they take back later is no drift "
-    "(`radarize.odometry.claims`); of methods that say nothing of it, claims of frames are added as if independent.",
+    "Turns over any time: errors of headings that are corrected later are no drift (`radarize.odometry.uncertainty`); "
+    "of methods without such errors, variances of frames are added as independent.",
     "To reach: 0.9 to 1.1 for velocities, mean and median, on every platform.",
 )
 

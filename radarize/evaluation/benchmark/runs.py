@@ -19,7 +19,7 @@ from radarize.pipeline.method import Inputs
 from radarize.pipeline.methods import ODOMETRY, SCANS, make_pipeline
 from radarize.pipeline.pipeline import Pipeline
 from radarize.pipeline.runfolder import RunFolder
-from radarize.pipeline.session import run_recording
+from radarize.pipeline.session import batches, run_recording
 from radarize.signal.batch import Preprocessor
 from radarize.signal.effort import BATCH
 from radarize.slam.config import LoopConfig, SlamConfig
@@ -144,12 +144,8 @@ class Timing(_Step):
             def run(frames: int, report: Report) -> tuple[Pipeline, float]:
                 pipeline = make_pipeline(inputs, self.pair.odometry, self.pair.scans)
                 preprocessor, start = Preprocessor(inputs.signal), time.perf_counter()
-                for first in range(0, frames, BATCH):
-                    stop = min(first + BATCH, frames)
-                    samples = source.adc(first, stop), source.times[first:stop], source.valid(first, stop)
-                    pipeline.push(preprocessor.process(*samples))
-                    report(stop / frames)
-                pipeline.finish()
+                for _ in pipeline.run(batches(source[:frames], preprocessor, lambda done, total: report(done / total))):
+                    pass
                 return pipeline, time.perf_counter() - start
 
             run(min(BATCH, self.frames), lambda share: None)  # compiles

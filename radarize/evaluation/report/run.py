@@ -200,7 +200,7 @@ def _heatmaps(page: Page, scans: Scans) -> None:
 
 def _settings(page: Page, facts: dict) -> None:
     page.section("Settings, versions, timings", "Everything needed to repeat this run.")
-    timings = facts.get("ms_per_frame") or facts.get("timings")
+    timings = facts.get("ms_per_frame")
     if isinstance(timings, dict) and timings:
         rows = [(stage, f"{value:.2f} ms") for stage, value in timings.items()]
         page.table(("time per frame", ""), [*rows, ("sum", f"{sum(timings.values()):.2f} ms")], numbers=(1,))

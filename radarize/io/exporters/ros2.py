@@ -21,7 +21,6 @@ from radarize.io.exporters.bagwriter import BagWriter, Message, header, message,
 from radarize.io.pose import OPTICAL_TURN, between
 from radarize.io.recording import Recording
 from radarize.io.tum import planar_poses
-from radarize.odometry.claims import Unknown
 from radarize.pipeline.log import Log
 from radarize.radar.config import RadarConfig
 from radarize.signal.heatmaps import Heatmaps
@@ -109,18 +108,18 @@ def _scans(log: Log, config: RadarConfig | None) -> Iterator[Event]:
 
 def _odometry(log: Log) -> Iterator[Event]:
     """Odometry with the covariance of the way since the start, and as a transform."""
-    poses, claims, unknown = planar_poses(log.odometry), log.claims, Unknown()
+    poses, spreads = planar_poses(log.odometry), np.zeros((len(log.odometry), 3, 3))
+    if log.errors is not None and len(poses):
+        spreads = log.errors.since_start(log.odometry)
     for k, (time, pose) in enumerate(zip(log.odometry_times, log.odometry, strict=True)):
         velocity = np.zeros(3)
         if k:
             step = between(log.odometry[k - 1], pose)
             velocity = step / (time - log.odometry_times[k - 1])
-            if claims is not None:
-                unknown.step(step, claims, k)
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])  # on the axes of the odometry's own frame
         twist = np.array([velocity[0], velocity[1], 0, 0, 0, velocity[2]])
-        yield time, "/odom", _odometry_message(time, ODOM, BASE, poses[k], twist, turn @ unknown.covariance @ turn.T)
+        yield time, "/odom", _odometry_message(time, ODOM, BASE, poses[k], twist, turn @ spreads[k] @ turn.T)
         yield time, "/tf", message("tf2_msgs/msg/TFMessage", transforms=[_transform(time, ODOM, BASE, poses[k])])
 
 

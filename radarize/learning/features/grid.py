@@ -20,7 +20,7 @@ TOLERANCE = 0.01
 LEAST_SHARE, COARSEST = 0.5, 2.0
 
 
-class Grid(Frozen):
+class MapGrid(Frozen):
     """Cells of a map: a network that knows one grid reads wrong speeds and ranges off another.
 
     Attributes:
@@ -39,7 +39,7 @@ class Grid(Frozen):
     frame_period: float = Field(gt=0, le=1e4)
 
     @classmethod
-    def of(cls, config: RadarConfig, name: str, maker: type[Maker] = MapMaker) -> "Grid":
+    def of(cls, config: RadarConfig, name: str, maker: type[Maker] = MapMaker) -> "MapGrid":
         """The grid of a radar's map."""
         axes = maker.axes(config, name)
         return cls(
@@ -50,7 +50,7 @@ class Grid(Frozen):
             frame_period=config.frame_period * maker.stride(config),
         )
 
-    def difference(self, other: "Grid", ignore: tuple[str, ...] = ()) -> str | None:
+    def difference(self, other: "MapGrid", ignore: tuple[str, ...] = ()) -> str | None:
         """What differs of another grid, in words; None if nothing does."""
         for name, own in self:
             if name not in ignore and abs(own - getattr(other, name)) > TOLERANCE * abs(own):
@@ -62,7 +62,7 @@ class Grid(Frozen):
         """m, or m/s from the lowest speed to the highest."""
         return self.rows * self.step
 
-    def lack(self, other: "Grid", unit: str) -> str | None:
+    def lack(self, other: "MapGrid", unit: str) -> str | None:
         """What another radar's maps, with rows in a unit, lack to be brought to this grid, in words; None if nothing
         does."""
         coarsest, least = COARSEST * self.step, LEAST_SHARE * self.reach
@@ -85,7 +85,7 @@ class Resampling:
         centred: rows are of speeds, zero in the middle; otherwise of ranges, from zero on.
     """
 
-    def __init__(self, known: Grid, own: Grid, centred: bool):
+    def __init__(self, known: MapGrid, own: MapGrid, centred: bool):
         wide = max(known.step, own.step)
         apart = np.abs(_places(known, centred)[:, None] - _places(own, centred))
         weights = np.clip(1 - apart / wide, 0, None)
@@ -94,7 +94,7 @@ class Resampling:
         self._weights = torch.from_numpy(weights / np.maximum(whole, 1e-9)).float()
 
     @classmethod
-    def between(cls, known: Grid, own: Grid, centred: bool) -> "Resampling | None":
+    def between(cls, known: MapGrid, own: MapGrid, centred: bool) -> "Resampling | None":
         """None where both have the same rows."""
         same = known.rows == own.rows and np.isclose(known.step, own.step, rtol=1e-6)
         return None if same else cls(known, own, centred)
@@ -109,6 +109,6 @@ class Resampling:
         return 10 * torch.log10(found)
 
 
-def _places(grid: Grid, centred: bool) -> Float[np.ndarray, "row"]:
+def _places(grid: MapGrid, centred: bool) -> Float[np.ndarray, "row"]:
     """Of rows, m or m/s."""
     return grid.step * (np.arange(grid.rows) - (grid.rows // 2 if centred else 0))

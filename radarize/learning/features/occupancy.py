@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import UInt8
 
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import Reading
 
 #: States of a cell of the occupancy label (`/truth/occupancy` says so).
@@ -11,7 +11,7 @@ FREE, SURFACE, UNKNOWN = 0, 1, 2
 
 
 def on_grid(
-    cells: UInt8[np.ndarray, "frame range bearing"], own: Grid, known: Grid
+    cells: UInt8[np.ndarray, "frame range bearing"], own: MapGrid, known: MapGrid
 ) -> UInt8[np.ndarray, "frame known bearing"]:
     """Labels of a radar's range bins on those of another: the nearest cell's, but no surface gets lost in between; what
     the radar does not reach is unknown."""

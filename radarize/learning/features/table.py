@@ -16,7 +16,7 @@ from radarize.io.errors import InputError
 from radarize.io.jobs import Report, attempt, perform
 from radarize.io.recording import Recording
 from radarize.io.tum import planar
-from radarize.learning.features.grid import Grid, Resampling
+from radarize.learning.features.grid import MapGrid, Resampling
 from radarize.signal.maps import Maker, MapMaker, maps_of
 
 #: Maps, and all else, of one recording, by name.
@@ -37,7 +37,7 @@ class Reading:
     name: str
     where: str
     of: Callable[[Recording, slice], np.ndarray] | None = None
-    on_grid: Callable[[np.ndarray, Grid, Grid], np.ndarray] | None = None
+    on_grid: Callable[[np.ndarray, MapGrid, MapGrid], np.ndarray] | None = None
 
     def rows(self, recording: Recording, frames: slice) -> np.ndarray:
         """A row for each of some frames."""
@@ -75,7 +75,7 @@ class FeatureTable:
     maps: dict[str, Tensor]
     truth: dict[str, Tensor]
     lengths: Sequence[int]
-    grid: Grid | None
+    grid: MapGrid | None
     frame_period: float
     sensed: dict[str, Tensor] = field(default_factory=dict)
 
@@ -89,7 +89,7 @@ class FeatureTable:
         maker: type[Maker] = MapMaker,
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
-        grid: Grid | None = None,
+        grid: MapGrid | None = None,
     ) -> "FeatureTable":
         """Read recordings of maps, or make the maps of recordings of samples.
 
@@ -188,16 +188,18 @@ class FeatureTable:
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
 
 
-def _open(path: Path, maps: Sequence[str], maker: type[Maker], grid: Grid | None) -> tuple[int, float, dict[str, Grid]]:
+def _open(
+    path: Path, maps: Sequence[str], maker: type[Maker], grid: MapGrid | None
+) -> tuple[int, float, dict[str, MapGrid]]:
     """Frames that networks see, their period, and the grids of their maps: that one, if they are brought to one."""
     with Recording(path) as recording:
         stride = maker.stride(recording.config)
-        grids = {name: grid or Grid.of(recording.config, name, maker) for name in maps}
+        grids = {name: grid or MapGrid.of(recording.config, name, maker) for name in maps}
         return -(-len(recording) // stride), stride * recording.config.frame_period, grids
 
 
 def _read(
-    path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], grid: Grid | None, _: Report
+    path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], grid: MapGrid | None, _: Report
 ) -> _Read:
     """Maps, and all else, of one recording, on a grid if there is one."""
     with Recording(path) as recording:
@@ -207,7 +209,7 @@ def _read(
         starts = range(0, count if maps else 0, size)
         own, bring = {}, {}
         if grid is not None:
-            own = {name: Grid.of(recording.config, name, kind) for name in maps}
+            own = {name: MapGrid.of(recording.config, name, kind) for name in maps}
             bring = {n: Resampling.between(grid, g, kind.axes(recording.config, n).centred) for n, g in own.items()}
         parts = []
         for start in starts:

@@ -18,7 +18,7 @@ from radarize import __version__
 from radarize.io.errors import InputError, explained
 from radarize.io.plain import Frozen
 from radarize.io.replacing import replacing
-from radarize.learning.features.grid import TOLERANCE, Grid, Resampling
+from radarize.learning.features.grid import TOLERANCE, MapGrid, Resampling
 from radarize.learning.features.windows import Windows
 from radarize.radar.array import azimuth_row
 from radarize.radar.config import RadarConfig
@@ -46,7 +46,7 @@ class Header(Frozen):
     frames: int
     maps: tuple[str, ...]
     width: int
-    grid: Grid | None
+    grid: MapGrid | None
     spacings: tuple[Annotated[int, Field(ge=1, le=1 << 10)], ...] = Field((1,), min_length=1, max_length=1 << 6)
     data: str = ""
     split: str | None = None
@@ -57,7 +57,7 @@ class Header(Frozen):
     version: str = __version__
 
     @property
-    def _seen(self) -> Grid:
+    def _seen(self) -> MapGrid:
         assert self.grid is not None  # who asks has a network that sees maps
         return self.grid
 
@@ -72,7 +72,7 @@ class Header(Frozen):
         chosen = self.spacings[:1] if spacings is None else spacings
         grid = self._seen
         ratio = grid.frame_period / config.frame_period
-        own, centred = Grid.of(config, self.maps[0], maker), maker.axes(config, self.maps[0]).centred
+        own, centred = MapGrid.of(config, self.maps[0], maker), maker.axes(config, self.maps[0]).centred
         return Windows(
             self.maps, self.frames, config.frame_period, sorted({max(1, round(ratio * spacing)) for spacing in chosen}),
             Resampling.between(grid, own, centred) if maker.physical else None,
@@ -84,7 +84,7 @@ class Header(Frozen):
 
     def difference(self, config: RadarConfig, maker: type[Maker]) -> str | None:
         """Why the network cannot be shown a radar's maps, in words; None if it can."""
-        grid, own, period = self._seen, Grid.of(config, self.maps[0], maker), config.frame_period
+        grid, own, period = self._seen, MapGrid.of(config, self.maps[0], maker), config.frame_period
         if not maker.physical:
             share = grid.frame_period / period
             fits = round(share) >= 1 and abs(share - round(share)) < TOLERANCE * share

@@ -10,7 +10,7 @@ import pandas as pd
 
 from radarize.io.errors import InputError
 from radarize.io.replacing import replacing
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.export import export_onnx
 from radarize.learning.nets.weights import load, save
@@ -128,7 +128,7 @@ def _nothing(*where: object) -> None:
 
 
 def _read(
-    task: Task, data: Path, options: TrainOptions, seed: int, progress: Callable[..., None], grid: Grid | None
+    task: Task, data: Path, options: TrainOptions, seed: int, progress: Callable[..., None], grid: MapGrid | None
 ) -> tuple[FeatureTable, FeatureTable]:
     """Training and validation data, on a grid if there is one."""
     if options.split is None:

@@ -21,7 +21,7 @@ from radarize.io.plain import complaint
 from radarize.io.replacing import write_whole
 from radarize.io.tum import read_tum
 from radarize.odometry.blindness import BlindSpans
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.health import Condition
 from radarize.pipeline.runfolder.occupancy import OccupancyMap
 
@@ -37,10 +37,10 @@ SHAPES = {
     "velocity_covariance": "scan 2 2",
     "velocity_seen": "scan",
     "turn_seen": "scan",
-    "step_covariance": "scan 3 3",
-    "claims/noise": "scan 3 3",
-    "claims/kept": "scan",
-    "claims/held": "scan",
+    "errors/duration": "scan",
+    "errors/noise": "scan 3 3",
+    "errors/correlation": "scan 2",
+    "errors/variance": "scan 3 3",
     "trajectory_covariance": "pose 3 3",
     "truth/velocity": "scan 2+",
     "truth/scan": "scan true_beam",
@@ -171,12 +171,10 @@ class RunFolder:
         return Scans(self.path / "scans.h5") if self.has("scans.h5") else Scans()
 
     @cached_property
-    def claims(self) -> Claims | None:
-        """Of odometry, of every scan; steps of old runs know nothing of each other. None where nothing is claimed."""
-        names = [f"claims/{each.name}" for each in fields(Claims)]
-        if self.scans.keys() >= {*names}:
-            return Claims(*(self.scans[name] for name in names))
-        return Claims.independent(self.scans["step_covariance"]) if "step_covariance" in self.scans else None
+    def errors(self) -> ErrorModel | None:
+        """Of odometry, of every scan; None where they are not known."""
+        names = [f"errors/{each.name}" for each in fields(ErrorModel)]
+        return ErrorModel(*(self.scans[name] for name in names)) if self.scans.keys() >= {*names} else None
 
     @cached_property
     def map(self) -> OccupancyMap | None:

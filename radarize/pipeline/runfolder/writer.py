@@ -93,10 +93,14 @@ class RunWriter:
         self.extend("velocity_covariance", track.velocity_covariance, "m^2/s^2")
         self.extend("velocity_seen", track.velocity_seen, "False: nothing determined the velocity")
         self.extend("turn_seen", track.turn_seen, "False: nothing determined the turn since the frame before")
-        self.extend("step_covariance", track.covariance, "m^2, m rad, rad^2: of odometry since before")
-        self.extend("claims/noise", track.claims.noise, "m^2, m rad, rad^2: of odometry since before")
-        self.extend("claims/kept", track.claims.kept, "share of the heading's error before")
-        self.extend("claims/held", track.claims.held, "rad^2: of the heading's error")
+        self.extend("errors/duration", track.errors.duration, "s, of the step since the frame before")
+        self.extend(
+            "errors/noise", track.errors.noise, "m^2, m rad, rad^2: what the step adds to the error of odometry"
+        )
+        self.extend(
+            "errors/correlation", track.errors.correlation, "share that goes on: of heading's error, velocity's"
+        )
+        self.extend("errors/variance", track.errors.variance, "rad^2, m^2/s^2: of the errors of heading and velocity")
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
     def describe(self, frames: Clip, heatmaps: Heatmaps) -> None:

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from radarize.evaluation.benchmark import odometry, runtime
-from radarize.evaluation.benchmark.choices import CHOICES, EVALUATION, helped
+from radarize.evaluation.benchmark.choices import CHOICES, SETS, helped
 from radarize.evaluation.benchmark.dataset import DataSet, groups
 from radarize.evaluation.benchmark.followed import FrameErrors
 from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, commit
@@ -18,7 +18,7 @@ from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.io.alignment import trajectory
 from radarize.io.errors import InputError
 from radarize.io.tum import planar_poses
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Weights
 from radarsim.dataset.specification import Specification
 from tests.evaluation.benchmark.rooms import write_rooms
@@ -77,7 +77,7 @@ def followed(length: float, speed: float, turn: float, frames: int = 40) -> tupl
         velocity,
         np.column_stack([zero, zero, turn * np.arange(frames)]),
         zero,
-        Claims.independent(np.tile(np.eye(3) * 1e-4, (frames, 1, 1))),
+        ErrorModel.independent(np.tile(np.eye(3) * 1e-4, (frames, 1, 1))),
         1 / 30,
     )
     return found, errors.summary()
@@ -162,8 +162,8 @@ def test_a_recording_tells_its_way_and_whether_it_is_real(rooms):
 
 def test_which_recordings_helped_to_choose_is_looked_up():
     tasks = Specification.load("evaluation").tasks
-    assert [task.seed for task in tasks] == [seed for seeds in EVALUATION.values() for seed in seeds]
-    walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in EVALUATION.items() for seed in seeds]
+    assert [task.seed for task in tasks] == [seed for seeds in SETS["EVALUATION"].values() for seed in seeds]
+    walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in SETS["EVALUATION"].items() for seed in seeds]
     said = helped(walks)
     assert len(said) == 2 and said[0].startswith("at most 4 of 15 helped to choose the probability")
     assert helped(walks[:2])[1].startswith("at most 2 of 2")

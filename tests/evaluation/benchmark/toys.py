@@ -4,8 +4,8 @@ import numpy as np
 
 from radarize.io.pose import between
 from radarize.io.tum import planar
-from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Inputs, Method
 from radarize.pipeline.methods import ODOMETRY, SCANS
 from radarize.signal.batch import Batch
@@ -25,7 +25,7 @@ class Scaled:
         rows = np.searchsorted(self.times, batch.stamps)
         velocity = self.steps[rows, :2] / self.period
         square, seen = np.tile(np.eye(3) * 1e-4, (len(batch), 1, 1)), np.ones((2, len(batch)), bool)
-        known = square, velocity, square[:, :2, :2], *seen, Claims.independent(square)
+        known = velocity, square[:, :2, :2], *seen, ErrorModel.independent(square)
         return Track(batch.centers, self.poses[rows], self.steps[rows], *known)
 
 

@@ -15,7 +15,7 @@ from radarize.io.importers.companions import depth_picture
 from radarize.io.pose import compose, exponential
 from radarize.io.recording import Product, Recording, RecordingWriter, Stream
 from radarize.io.tum import planar, planar_poses, write_tum
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.log import run as slam
 from radarize.pipeline.runfolder import OccupancyMap
 from radarize.radar.presets import PRESETS
@@ -156,8 +156,8 @@ def test_covariance_adds_up_as_in_a_simulation():
     from radarize.pipeline.log import Log
 
     rng, error = np.random.default_rng(1), np.diag([0.01, 0.02, 0.01]) ** 2
-    errors = np.tile(error, (COUNT, 1, 1))
-    log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), errors, Claims.independent(errors))
+    errors = ErrorModel.independent(np.tile(error, (COUNT, 1, 1)))
+    log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), errors)
     claimed = [message for _, topic, message in _odometry(log) if topic == "/odom"][-1].pose.covariance.reshape(6, 6)
     walks = np.zeros((20_000, 3))
     for _ in range(COUNT - 1):

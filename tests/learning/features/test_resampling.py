@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from radarize.learning.features.grid import Grid, Resampling
+from radarize.learning.features.grid import MapGrid, Resampling
 from radarize.learning.features.occupancy import FREE, SURFACE, UNKNOWN, on_grid
 from radarize.radar.presets import PRESETS
 from radarize.signal.maps import AZIMUTHS, MAPS, MapMaker
@@ -20,8 +20,8 @@ OTHERS = {
 }
 
 
-def grid(rows: int, step: float) -> Grid:
-    return Grid(rows=rows, step=step, azimuths=80, field=1.0, frame_period=0.1)
+def grid(rows: int, step: float) -> MapGrid:
+    return MapGrid(rows=rows, step=step, azimuths=80, field=1.0, frame_period=0.1)
 
 
 @pytest.mark.parametrize("own", [grid(60, 0.5), grid(60, 1.0), grid(90, 1.7), grid(400, 0.13)])
@@ -69,7 +69,9 @@ def test_an_echo_is_in_the_same_cell_for_every_radar(name):
             record(each, pose, point, np.array([400.0]), np.zeros(1), rng, noise=5.0), names=tuple(MAPS)
         )
         for which, made in maps.items():
-            resampling = Resampling.between(Grid.of(KNOWN, which), Grid.of(each, which), which.startswith("doppler"))
+            resampling = Resampling.between(
+                MapGrid.of(KNOWN, which), MapGrid.of(each, which), which.startswith("doppler")
+            )
             shown = torch.from_numpy(made).float()[:, None]
             shown = shown if resampling is None else resampling(shown)
             assert shown.shape[2:] == MapMaker(KNOWN).shape(which)

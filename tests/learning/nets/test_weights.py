@@ -13,7 +13,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from radarize.io.errors import InputError
-from radarize.learning.features.grid import Grid
+from radarize.learning.features.grid import MapGrid
 from radarize.learning.nets.export import export_onnx
 from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.segmentation import SegmentationNet
@@ -29,7 +29,7 @@ def network(kind: str, width: int = 4):
     """One with weights and statistics that say something."""
     maps = MAPS.get(kind, ("range_azimuth", "elevation_aware"))
     header = Header(
-        kind=kind, frames=2, maps=maps, width=width, grid=Grid.of(CONFIG, maps[0]), data="small", seed=3,
+        kind=kind, frames=2, maps=maps, width=width, grid=MapGrid.of(CONFIG, maps[0]), data="small", seed=3,
         metrics={"loss": 0.5},
     )  # fmt: skip
     torch.manual_seed(0)

@@ -127,7 +127,7 @@ def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
 
 def test_the_example_of_the_readme_trains(folder, monkeypatch, capsys):
     """As printed, on these recordings: the loss falls."""
-    code = next(c for c in re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), re.S) if "Frames(" in c)
+    code = next(c for c in re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), re.S) if "FrameDataset(" in c)
     assert len([line for line in code.splitlines() if line.strip()]) <= 12
     torch.manual_seed(0)
     exec(compile(code.replace('"small"', repr(str(folder))), HOW_TO.name, "exec"), {})

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from radarize.cli import app
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording
-from radarize.learning.features.grid import Grid, Resampling
+from radarize.learning.features.grid import MapGrid, Resampling
 from radarize.learning.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
 from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
@@ -302,13 +302,13 @@ OTHER = CONFIG.model_copy(update={"loops": 24, "samples": 32})
 def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
     """As networks are shown them; frames of the radar that has the grid stay as they are."""
     paths = [write(tmp_path / "a.h5", "velocity", 5), write(tmp_path / "b.h5", "velocity", 6, config=OTHER)]
-    grid = Grid.of(CONFIG, "doppler_azimuth")
+    grid = MapGrid.of(CONFIG, "doppler_azimuth")
     table = FeatureTable.read(paths, ("doppler_azimuth",), (VELOCITY,), grid=grid)
     assert table.grid == grid and list(table.lengths) == [5, 6]
     with Recording(paths[0]) as own, Recording(paths[1]) as other:
         assert np.array_equal(table.maps["doppler_azimuth"][:5], own.read("maps/doppler_azimuth"))
         made = torch.from_numpy(other.read("maps/doppler_azimuth")).float()[:, None]
-        shown = Resampling(grid, Grid.of(OTHER, "doppler_azimuth"), centred=True)(made)[:, 0]
+        shown = Resampling(grid, MapGrid.of(OTHER, "doppler_azimuth"), centred=True)(made)[:, 0]
         assert torch.allclose(table.maps["doppler_azimuth"][5:].float(), shown, atol=0.02)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from radarize.io.errors import DiskFull, InputError
 from radarize.io.tum import planar_poses, write_tum
-from radarize.odometry.claims import Claims
+from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.pipeline import Result
 from radarize.pipeline.runfolder import RunFolder, RunWriter
 from radarize.radar.presets import PRESETS
@@ -27,10 +27,13 @@ def result(first, count):
     step = np.tile([0.02, 0.0, 0.01], (count, 1))
     track = SimpleNamespace(
         time=frames / 30, pose=frames[:, None] * [0.02, 0.0, 0.001], step=step,
-        covariance=np.tile(np.eye(3) * 1e-6, (count, 1, 1)), velocity=RNG.normal(size=(count, 2)),
+        velocity=RNG.normal(size=(count, 2)),
         velocity_covariance=np.tile(np.eye(2) * 1e-4, (count, 1, 1)), velocity_seen=frames < 50,
         turn_seen=np.ones(count, bool),
-        claims=Claims(RNG.uniform(size=(count, 3, 3)), RNG.uniform(size=count), RNG.uniform(size=count)),
+        errors=ErrorModel(
+            np.full(count, 1 / 30), RNG.uniform(size=(count, 3, 3)), RNG.uniform(size=(count, 2)),
+            RNG.uniform(size=(count, 3, 3)),
+        ),
     )  # fmt: skip
     ranges = np.where(frames[:, None] % 2, 3 / np.cos(BEARINGS), np.inf)
     return Result(frames, track, ranges.astype(np.float32))
@@ -59,12 +62,11 @@ def test_what_is_written_is_read(tmp_path):
     results = [result(0, 16), result(16, 5), result(30, 40)]  # frames 21...29 were lost
     writer = write(tmp_path / "a" / "RUN", results)
     run = RunFolder(tmp_path / "a" / "RUN")
-    named = {name: name for name in ("time", "velocity", "velocity_seen", "turn_seen")}
-    for name, of in (named | {"step_covariance": "covariance"}).items():
-        assert np.array_equal(run.scans[name], np.concatenate([getattr(each.track, of) for each in results]))
-    for name in ("noise", "kept", "held"):
-        claimed = np.concatenate([getattr(each.track.claims, name) for each in results])
-        assert np.array_equal(getattr(run.claims, name), claimed)
+    for name in ("time", "velocity", "velocity_seen", "turn_seen"):
+        assert np.array_equal(run.scans[name], np.concatenate([getattr(each.track, name) for each in results]))
+    for name in ("duration", "noise", "correlation", "variance"):
+        expected = np.concatenate([getattr(each.track.errors, name) for each in results])
+        assert np.array_equal(getattr(run.errors, name), expected)
     assert np.array_equal(run.scans["frames"], [*range(21), *range(30, 70)])
     assert np.array_equal(run.scans["ranges"], np.concatenate([each.ranges for each in results]))
     times, poses = run.odometry

@@ -17,7 +17,7 @@ from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.drawing import Drawing
 from radarize.slam.grid import OccupancyGrid
-from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty, without_prior
+from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
 from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
 from radarize.slam.odometry import FARTHEST, Drift, Odometry, Stillness
@@ -275,8 +275,7 @@ class Slam:
             submap.grid, points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
-        measured = without_prior(result, prior, covariance)
-        self.graph.add_match(submap.anchor, len(self.nodes), measured, noise)
+        self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
         return compose(self._local[submap.anchor], result.pose)
 
     def _insert(self, number: int, node: Node) -> None:

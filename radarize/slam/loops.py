@@ -25,8 +25,6 @@ from radarize.slam.submap import Submap
 
 _PYRAMIDS = 12  # kept of the submaps searched last
 _WORKERS = 2
-#: 1 / m^2 and 1 / rad^2: information of a match that sees nothing.
-BLIND = np.diag([1e-2, 1e-2, 1.0])
 
 
 @dataclass(frozen=True)
@@ -174,15 +172,5 @@ class Jury:
 
 def uncertainty(result: Match, translation: float, rotation: float) -> Float[np.ndarray, "3 3"]:
     """Covariance of a match: the inverse of its information, with floors (m, rad); 10 m and 1 rad where blind."""
-    return np.linalg.inv(result.information + BLIND) + np.diag([translation, translation, rotation]) ** 2
-
-
-def without_prior(
-    result: Match, prior: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]
-) -> Float[np.ndarray, "3"]:
-    """Pose that a scan alone would have been matched at: the graph has the prior already.
-
-    At the result the pulls of scan and prior cancel, so that the scan's own optimum lies on the other side of it.
-    """
-    pull = np.linalg.solve(covariance, between(result.pose, prior))
-    return compose(result.pose, -np.linalg.solve(result.information + BLIND, pull))
+    blind = np.diag([1e-2, 1e-2, 1.0])
+    return np.linalg.inv(result.information + blind) + np.diag([translation, translation, rotation]) ** 2

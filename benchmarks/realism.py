@@ -59,6 +59,7 @@ def rows(found: dict[str, list[Bursts]], judged: dict[str, dict[str, discriminat
     recordings=(SHARED / "radarhd", "folder of the real walks"),
     walks=(25, "simulated walks, each through a building of its own"),
     seed=(5000, "of buildings, walks and worlds, and of the discriminator"),
+    sets=(",".join(SETS), "simulated rooms, by commas"),
     workers=(2, "processes"),
     sheets=("", "folder for sheets of pictures, real ones among them; none if empty"),
 )
@@ -66,9 +67,9 @@ def main(options: argparse.Namespace) -> Page:
     found = {"real, train": list(real(options.recordings, "train").values())}
     pictures = [walk.reshape(-1, *walk.shape[2:]) for walk in found["real, train"]]
     beams = {n: np.median([statistics.beam_misfit(every, n) for every in pictures]) for n in (4, 8)}
-    judged = {}
-    for name, surfaces in SETS.items():
-        found[name] = simulated(options.walks, options.seed, surfaces, options.workers)
+    judged, sets = {}, options.sets.split(",")
+    for name in sets:
+        found[name] = simulated(options.walks, options.seed, SETS[name], options.workers)
         judged[name] = told_apart(found["real, train"], found[name], options.seed)
         if options.sheets:
             draw(Path(options.sheets), name, found["real, train"], found[name], judged[name]["one picture"])
@@ -79,7 +80,7 @@ def main(options: argparse.Namespace) -> Page:
                 for _ in found[f"real, {part}"]]  # fmt: skip
     return Page(
         rows(found, judged),
-        data=Data("RadarHD's walks and walks by cart with their chirps", (*recorded, *made * len(SETS)), options.seed),
+        data=Data("RadarHD's walks and walks by cart with their chirps", (*recorded, *made * len(sets)), options.seed),
         notes=[
             "Told apart: balanced accuracy of a network on walks that it has not seen, mean of five folds; 50 % is "
             "chance. It is trained on the training walks and the simulated ones, 200 pictures or 80 pairs a walk.",

@@ -229,6 +229,8 @@ def test_recordings_of_the_simulator_are_read(tmp_path):
     header = task.header(task.defaults, table.grid)
     assert header.maps == ("picture",) and (header.grid.rows, header.grid.azimuths) == (polar.ROWS, polar.COLUMNS)
     assert header.grid.frame_period == 0.05
+    again = task.table([tmp_path / "a.h5"], grid=header.grid)  # as a training reads that starts from weights
+    assert again.grid == table.grid and again.maps["antennas"].equal(table.maps["antennas"])
 
 
 def test_it_learns_turns(one_thread):

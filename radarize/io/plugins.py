@@ -38,6 +38,8 @@ class Plugins(MutableMapping[str, Part], Generic[Part]):
         Raises:
             InputError: no part has this name, or its module cannot be imported.
         """
+        if not self._installed and not self._added:
+            raise InputError(f"{self.what} {name}: no {self.group} is installed, expected radarize installed by pip")
         if name not in self:
             raise InputError(f"{self.what} is {name!r}, expected one of {', '.join(self)}")
         return self[name]

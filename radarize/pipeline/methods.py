@@ -70,7 +70,7 @@ def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
     chosen, why, weights = dict(BEST), [], Weights()
     for what, known in (("odometry", ODOMETRY), ("scans", SCANS)):
         try:
-            for kind in known[BEST[what]].needed(radar):
+            for kind in known.find(BEST[what]).needed(radar):
                 check(weights.of(kind), radar)
         except InputError as error:
             chosen[what] = CLASSICAL[what]

@@ -1,7 +1,8 @@
 """How far RadarHD's radar and lidar pictures of one number are apart in time, walk by walk.
 
 Clocks are estimated by how alike pictures are (`radarize.baselines.walks.clock`). An independent check: turns
-by shifting the radar's pictures against each other, compared with those of the lidar's poses, by number and by instant.
+by shifting the radar's pictures against each other, compared with those of the lidar's poses, matched by
+frame index and by time.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """What simulation saves of reality: the network for RadarHD's pictures trained on real walks alone, and the same walks
 shown to one that was trained in simulation first.
 
-Pictures are paired by instant (`radarize.baselines.walks.clock`), and judged by instant and by number. Only training
+Pictures are matched by time (`radarize.baselines.walks.clock`), and judged by time and by frame index. Only training
 walks are shown, and only test walks judge. The weights stay with whoever makes them, and those that are there already
 are not made again. Made for a GPU; `--steps 10` tries it on two cores.
 """

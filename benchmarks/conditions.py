@@ -66,13 +66,14 @@ class Trial(NamedTuple):
             inputs = Inputs(recording.config)
             pipeline, preprocessor = make_pipeline(inputs, **BEST), Preprocessor(inputs.signal)
             health, truth = Health(recording.config), trajectory(*recording.true_poses())
-            for frames, adc in recording.batches(BATCH):
-                samples = Samples(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
-                if len(batch := preprocessor.process(*(hurt(samples, rng) if hurt else samples))):
-                    result = pipeline.push(batch)
-                    health.add(result)
-                    tracks.append(result.track)
-            pipeline.finish()
+            samples = (
+                Samples(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
+                for frames, adc in recording.batches(BATCH)
+            )
+            batches = (preprocessor.process(*(hurt(each, rng) if hurt else each)) for each in samples)
+            for result in pipeline.run(batches):
+                health.add(result)
+                tracks.append(result.track)
         times, poses = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("time", "pose"))
         spread = ErrorModel.joined([track.errors for track in tracks]).since_start(poses)[-1]
         found = (times, poses), pipeline.slam.trajectory()

@@ -47,8 +47,11 @@ SIMULATOR = (
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are
 #: compared by what the pipeline makes of them, too.
 SHARED = (
-    "io", "radar", "signal", "learning.features", "pipeline.runfolder", "evaluation.report",
+    "io", "radar", "signal.heatmaps", "signal.maps", "signal.points", "signal.polar", "learning.features",
+    "pipeline.runfolder", "evaluation.report",
 )  # fmt: skip
+#: What only its twins may take beside, and what none of it may take of the first.
+OF_TWINS, APART = ("signal.batch", "signal.bearings", "odometry", "scans"), ("io.importers", "io.load", "io.alignment")
 
 
 @cache
@@ -132,8 +135,11 @@ def test_the_pipeline_needs_no_simulator():
 
 def test_the_simulator_takes_only_sensor_and_files_from_the_pipeline():
     def shared(name: str, module: str) -> bool:
-        parts = (*SHARED, *(("odometry", "scans") if name.startswith("radarsim.twin.") else ()))
-        return any(f"{module}.".startswith(f"radarize.{each}.") for each in parts)
+        def within(parts: tuple[str, ...]) -> bool:
+            return any(f"{module}.".startswith(f"radarize.{each}.") for each in parts)
+
+        parts = (*SHARED, *(OF_TWINS if name.startswith("radarsim.twin.") else ()))
+        return within(parts) and not within(APART)
 
     names = {(f, n) for f, names in imported("radarsim").items() for n in names if n.startswith("radarize.")}
     assert not {(f, n) for f, n in names if not shared(f, n)}
@@ -162,11 +168,9 @@ def loaded(code: str) -> set[str]:
 def test_the_pipeline_loads_no_method_and_no_training():
     found = loaded("import radarize.pipeline.pipeline, radarize.evaluation.report.run")
     assert "radarize.pipeline.pipeline" in found
-    assert not {
-        name
-        for name in found
-        if name.startswith(("radarize.learning.training", "radarize.evaluation.benchmark", "radarize.baselines"))
-    }
+    methods = ("pipeline.classical", "pipeline.networked", "odometry.learned", "odometry.fused", "scans.segmentation")
+    apart = (*methods, "baselines", "learning.training", "evaluation.benchmark")
+    assert not {name for name in found for each in apart if name.startswith(f"radarize.{each}")}
     assert not found & {"scipy.signal", "scipy.stats", "pandas"}  # a fifth of what a command loads
 
 

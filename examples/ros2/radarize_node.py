@@ -28,7 +28,7 @@ from radarize.capture.stream import follow
 from radarize.io.pose import between, compose, inverse
 from radarize.odometry.uncertainty import MotionCovariance
 from radarize.pipeline.method import Inputs
-from radarize.pipeline.methods import best_methods, make_pipeline, pace
+from radarize.pipeline.methods import choose_methods, make_pipeline, pace
 from radarize.pipeline.runfolder import OccupancyMap
 from radarize.radar.presets import load_config
 from radarize.signal.batch import Preprocessor
@@ -54,8 +54,8 @@ class RadarizeNode(Node):
         else:
             config, text = load_config(given["config"] or "radarize")
             self.stream = Sensor(config, text, given["config"] or "radarize", given["port"])
-        radar, best = self.stream.config, best_methods(self.stream.config)[0]
-        methods = {kind: given[kind] or best[kind] for kind in ("odometry", "scans")}
+        radar = self.stream.config
+        methods, _ = choose_methods(radar, given["odometry"], given["scans"])
         self.inputs = prepare(Inputs(radar, every=pace(methods["odometry"], radar)), methods)
         self.pipeline = make_pipeline(self.inputs, **methods, endless=True)
         self.scans = self.create_publisher(LaserScan, "scan", 10)

@@ -23,8 +23,8 @@ from radarize.io.errors import InputError, refuse_unknown
 from radarize.io.recording import spare
 from radarize.pipeline.config import Configuration
 from radarize.pipeline.method import Inputs, Weights
-from radarize.pipeline.methods import BEST, best_methods, pace
-from radarize.pipeline.odometry import configuration, folder
+from radarize.pipeline.methods import choose_methods, pace
+from radarize.pipeline.odometry import configuration
 from radarize.pipeline.pipeline import Result
 from radarize.pipeline.runfolder import OccupancyMap
 from radarize.radar.config import RadarConfig
@@ -263,10 +263,9 @@ def live(
     stream = Replay(Path(replay)) if replay else sensor(config, port, options)
     radar = stream.config
     weights = options.get("weights")
-    best = BEST if weights else best_methods(radar)[0]
-    methods = {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}
+    methods, _ = choose_methods(radar, odometry, scans, own_weights=bool(weights))
     every = every or pace(methods["odometry"], radar)
-    inputs = Inputs(radar, configuration(options.get("pipeline")), Weights(folder(weights)), every=every)
+    inputs = Inputs(radar, configuration(options.get("pipeline")), Weights(weights), every=every)
     return LiveSession(stream, inputs, methods, frames_within(duration, frames, radar.frame_period), options)
 
 

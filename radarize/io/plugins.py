@@ -64,7 +64,7 @@ class Plugins(MutableMapping[str, Part], Generic[Part]):
 
     def __iter__(self) -> Iterator[str]:
         """Names of what can be imported: folders of this package may be deleted."""
-        there = {name for name, point in self._installed.items() if name in self._added or _exists(point.module)}
+        there = {name for name, point in self._installed.items() if _exists(point.module)}
         return iter(sorted(there | self._added.keys()))
 
     def __len__(self) -> int:

@@ -23,8 +23,8 @@ class Weights:
         folder: with ``translation.safetensors`` and so on, as `radarize train` writes them; the shipped ones if None.
     """
 
-    def __init__(self, folder: Path | None = None):
-        self.folder = folder
+    def __init__(self, folder: str | Path | None = None):
+        self.folder = None if folder is None else Path(folder)
 
     def of(self, kind: str) -> Path:
         """File of a network."""

@@ -29,7 +29,7 @@ def make_odometry(inputs: Inputs, name: str) -> OdometryEstimator:
     Raises:
         InputError: unknown name, or see `Method`.
     """
-    return _readable(ODOMETRY.find(name), f"odometry {name}", PICTURED["odometry"], inputs).make(inputs)
+    return _readable(ODOMETRY, name, inputs).make(inputs)
 
 
 def make_scans(inputs: Inputs, name: str) -> ScanExtractor:
@@ -38,7 +38,7 @@ def make_scans(inputs: Inputs, name: str) -> ScanExtractor:
     Raises:
         InputError: unknown name, or see `Method`.
     """
-    return _readable(SCANS.find(name), f"scans {name}", PICTURED["scans"], inputs).make(inputs)
+    return _readable(SCANS, name, inputs).make(inputs)
 
 
 def make_pipeline(inputs: Inputs, odometry: str, scans: str, endless: bool = False) -> Pipeline:
@@ -55,14 +55,33 @@ def make_pipeline(inputs: Inputs, odometry: str, scans: str, endless: bool = Fal
     return Pipeline(make_odometry(inputs, odometry), make_scans(inputs, scans), inputs.configuration.slam, endless)
 
 
-def _readable(method: Method, name: str, pictured_method: str, inputs: Inputs) -> Method:
+def _readable(known: Plugins[Method], name: str, inputs: Inputs) -> Method:
     """The method, if it can read the recording."""
-    recording = inputs.recording
+    recording, method, what = inputs.recording, known.find(name), known.what
     if recording is not None and not recording.has_samples and not (method.pictures or method.scans):
-        what = name.partition(" ")[0]
-        wanted = f"{what} {pictured_method}" if pictured(recording) else "a recording with /radar/adc"
-        raise InputError(f"{recording.path}: has no raw samples, which {name} needs, expected {wanted}")
+        wanted = f"{what} {PICTURED[what]}" if pictured(recording) else "a recording with /radar/adc"
+        raise InputError(f"{recording.path}: has no raw samples, which {what} {name} needs, expected {wanted}")
     return method
+
+
+def choose_methods(
+    radar: RadarConfig,
+    odometry: str | None = None,
+    scans: str | None = None,
+    *,
+    own_weights: bool = False,
+    pictures: bool = False,
+) -> tuple[dict[str, str], str]:
+    """Methods by what they are for, those of choice where none is named; and why these have no networks, if so.
+
+    Args:
+        radar: configuration.
+        odometry, scans: names, if given.
+        own_weights: networks are the user's, so the shipped ones need not fit the radar.
+        pictures: the recording holds pictures and no samples.
+    """
+    best, why = (PICTURED, "") if pictures else (BEST, "") if own_weights else best_methods(radar)
+    return {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}, why
 
 
 def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:

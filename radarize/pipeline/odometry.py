@@ -7,13 +7,12 @@ import numpy as np
 
 from radarize.io.errors import InputError
 from radarize.io.load import Source, frames_of
-from radarize.io.recording import Clip
 from radarize.io.trajectory import Trajectory
 from radarize.io.tum import planar_poses
 from radarize.odometry.integration import Track
 from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.config import Configuration
-from radarize.pipeline.methods import BEST, ODOMETRY, PICTURED, best_methods, make_odometry, make_scans
+from radarize.pipeline.methods import ODOMETRY, choose_methods, make_odometry, make_scans
 from radarize.pipeline.session import batches, inputs_of
 from radarize.signal.batch import Preprocessor
 from radarize.signal.polar import pictured
@@ -54,8 +53,10 @@ def estimate_odometry(
         ((24, 2), (24, 3, 3))
     """
     frames = frames_of(frames)
-    chosen, _ = choose(frames, weights, method, scans)
-    inputs = inputs_of(frames, folder(weights), configuration(config))
+    chosen, _ = choose_methods(
+        frames.config, method, scans, own_weights=bool(weights), pictures=pictured(frames.recording)
+    )
+    inputs = inputs_of(frames, weights, configuration(config))
     estimator = make_odometry(inputs, chosen["odometry"])
     extractor = make_scans(inputs, chosen["scans"]) if ODOMETRY[chosen["odometry"]].scans else None
     tracks = []
@@ -66,21 +67,6 @@ def estimate_odometry(
     if not tracks:
         raise InputError(f"{frames.recording.path}: all its {len(frames)} frames are lost or silent, expected samples")
     return trajectory(tracks)
-
-
-def choose(
-    frames: Clip, weights: str | Path | None, odometry: str | None, scans: str | None
-) -> tuple[dict[str, str], str]:
-    """Methods by what they are for, those of choice where none is named; and why these have no networks, if so."""
-    best, why = (BEST, "") if weights else best_methods(frames.config)
-    if pictured(frames.recording):
-        best, why = PICTURED, ""
-    return {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}, why
-
-
-def folder(weights: str | Path | None) -> Path | None:
-    """Where weights lie."""
-    return None if weights is None else Path(weights)
 
 
 def configuration(config: Configuration | str | Path | None) -> Configuration:

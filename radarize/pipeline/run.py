@@ -19,10 +19,12 @@ from radarize.io.replacing import Replacement
 from radarize.io.trajectory import Trajectory
 from radarize.io.tum import planar
 from radarize.pipeline.config import Configuration
-from radarize.pipeline.odometry import choose, configuration, folder
+from radarize.pipeline.methods import choose_methods
+from radarize.pipeline.odometry import configuration
 from radarize.pipeline.runfolder import OccupancyMap, RunFolder
 from radarize.pipeline.runfolder.reader import FILES
 from radarize.pipeline.session import run_recording
+from radarize.signal.polar import pictured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -203,11 +205,13 @@ def run(
                 raise InputError(f"--{name} is {value!r}, expected none with --settings published, which has its own")
         odometry = scans = "published"
     frames = frames_of(recording)
-    methods, why = choose(frames, weights, odometry, scans)
+    methods, why = choose_methods(
+        frames.config, odometry, scans, own_weights=bool(weights), pictures=pictured(frames.recording)
+    )
     place = Path(tempfile.mkdtemp(prefix="radarize-") if output is None else output)
     try:
         run_recording(
-            frames, place, methods, weights=folder(weights), configuration=configuration(config),
+            frames, place, methods, weights=weights, configuration=configuration(config),
             facts={"no networks": why} if why else None, progress=progress or (lambda done, total: None),
         )  # fmt: skip
         made = Run(place)

@@ -19,7 +19,7 @@ def run_recording(
     folder: Path,
     methods: Mapping[str, str],
     *,
-    weights: Path | None = None,
+    weights: str | Path | None = None,
     configuration: Configuration | None = None,
     facts: Mapping[str, str] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -66,7 +66,7 @@ def run_recording(
         writer.finish(pipeline.slam, about)
 
 
-def inputs_of(frames: Clip, weights: Path | None, configuration: Configuration | None) -> Inputs:
+def inputs_of(frames: Clip, weights: str | Path | None, configuration: Configuration | None) -> Inputs:
     """What methods are made from, for frames of a recording.
 
     Raises:

@@ -23,7 +23,7 @@ def record(
     """int16 frames (frame, loop, tx, rx, sample, 2) of static points (n, 3) with complex amplitudes in ADC counts.
 
     `pose` maps times to positions (..., 3) and yaws (...). Phases are exact for every chirp and antenna; the beat
-    frequency is held for `block` loops (1: exact as well). Receivers have the board's signs. `gain` maps points in the
+    frequency is held for `block` loops (1: exact as well). Antennas have the board's signs. `gain` maps points in the
     sensor frame at the burst's middle (n, 3) to factors on their amplitudes.
     """
     n = np.arange(config.samples)
@@ -55,7 +55,7 @@ def record(
         path = out[:, :, None] + back
         phase = ((wavenumber * path) % (2 * np.pi)).astype(np.float32)
         phasor = strength.astype(np.complex64) * np.exp(np.complex64(1j) * phase)
-        phasor *= np.float32(load_board(config.board).rx_sign)[list(config.rx), None]
+        phasor *= np.float32(load_board(config.board).signs[config.channels])[..., None]
         signal = np.empty((*path.shape[:3], config.samples), np.complex64)
         for start in range(0, config.loops, block):
             part = slice(start, start + block)

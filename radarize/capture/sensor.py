@@ -11,6 +11,7 @@ from radarize.capture.stream import FrameStream
 from radarize.capture.uart import BAUD, Uart, text_for
 from radarize.io.errors import InputError
 from radarize.io.recording.captured import FROM_RADAR
+from radarize.radar.cfg import remarks
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000_commands import Status
 from radarize.radar.limits import check_limits
@@ -60,7 +61,7 @@ class Sensor(FrameStream):
             self._board = stack.enter_context(CaptureCard(network))
             self._receiver = stack.enter_context(network.bind(network.data_port))
             self._open = stack.pop_all()
-        self._notes = buffer_warning(enlarge(self._receiver), config)
+        self._notes = [*remarks(text, config), *buffer_warning(enlarge(self._receiver), config)]
         super().__init__(config, receive, self._receiver, network.dca, config, slots=slots)
 
     def __enter__(self) -> "Sensor":

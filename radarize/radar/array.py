@@ -1,14 +1,18 @@
 """Antenna positions of the evaluation boards and the virtual array that they span.
 
 Sensor frame: x forward (boresight), y left, z up, origin at the (0, 0) of the board's layout (RX1; RX4 on the AOP).
-The layouts stand in the boards' files (`radarize.radar.boards`).
+The layouts stand in the boards' files (`radarize.radar.boards`). Transmitters that fire at once are one in the middle
+between them.
 """
+
+from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from radarize.radar.boards import load_board
-from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
 
 #: Antennas of a row that is not short; what velocities claim was fitted to rows of these.
 ROW = 8
@@ -16,18 +20,17 @@ ROW = 8
 
 def tx_positions(config: RadarConfig) -> Float[np.ndarray, "tx 3"]:
     """Positions of the enabled transmitters in the sensor frame, m, physical order."""
-    return _positions(config, load_board(config.board).tx, config.tx)
+    layout = np.asarray(load_board(config.board).tx, float)
+    return _positions(config, np.array([layout[list(fired(firing))].mean(axis=0) for firing in config.tx]))
 
 
 def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
     """Positions of the enabled receivers in the sensor frame, m, physical order."""
-    return _positions(config, load_board(config.board).rx, config.rx)
+    return _positions(config, np.asarray(load_board(config.board).rx, float)[list(config.rx)])
 
 
-def _positions(config: RadarConfig, layout: tuple, enabled: tuple[int, ...]) -> Float[np.ndarray, "antenna 3"]:
-    positions = np.zeros((len(enabled), 3))
-    positions[:, 1:] = _half(config) * np.asarray(layout, float)[list(enabled)]
-    return positions
+def _positions(config: RadarConfig, layout: Float[np.ndarray, "antenna 2"]) -> Float[np.ndarray, "antenna 3"]:
+    return np.column_stack([np.zeros(len(layout)), _half(config) * layout])
 
 
 def virtual_positions(config: RadarConfig) -> Float[np.ndarray, "tx rx 3"]:
@@ -43,9 +46,9 @@ def _half(config: RadarConfig) -> float:
     return SPEED_OF_LIGHT / load_board(config.board).design_frequency / 2
 
 
-def _lattice(config: RadarConfig) -> Int[np.ndarray, "antenna 2"]:
-    """Left and up of the virtual antennas, flat (tx, rx), in half wavelengths."""
-    return np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / _half(config)).astype(int)
+def _lattice(config: RadarConfig) -> Float[np.ndarray, "antenna 2"]:
+    """Left and up of the virtual antennas, flat (tx, rx), in half wavelengths to three digits."""
+    return np.round(virtual_positions(config).reshape(-1, 3)[:, 1:] / _half(config), 3)
 
 
 def rows(config: RadarConfig) -> dict[float, Int[np.ndarray, "antenna"]]:
@@ -66,20 +69,50 @@ def azimuth_row(config: RadarConfig) -> Int[np.ndarray, "antenna"]:
     return max(rows(config).values(), key=len)
 
 
-def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
-    """Pairs (lower, upper) of virtual antennas at the same y, half a wavelength apart in z; None without such pairs.
+def row_beside(heights: Iterable[float], height: float) -> float | None:
+    """The row that tells elevation together with the one at `height`: the nearest less than a wavelength away, the
+    upper one of two; None without one. Heights in half wavelengths."""
+    others = sorted((h for h in heights if 0 < abs(h - height) < 2), key=lambda h: (abs(h - height), -h))
+    return others[0] if others else None
 
-    Averaging a pair steers to 0 deg elevation and nulls the zenith: the paper's elevation-aware beamforming (section
-    4).
+
+def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
+    """Pairs (lower, upper) of virtual antennas at the same y in rows that follow each other, less than a wavelength
+    apart in z; None without such pairs.
+
+    Averaging a pair steers to 0 deg elevation and, where it is half a wavelength high, nulls the zenith: the paper's
+    elevation-aware beamforming (section 4).
     """
     grid, by_height, pairs = _lattice(config), rows(config), []
-    for height, lower in by_height.items():
-        upper = by_height.get(height + 1.0, ())
-        left_of_upper = {grid[u, 0]: u for u in upper}
-        pairs += [(low, left_of_upper[grid[low, 0]]) for low in lower if grid[low, 0] in left_of_upper]
+    heights = sorted(by_height)
+    for height, above in pairwise(heights):
+        if above - height >= 2:
+            continue
+        left_of_upper = {grid[u, 0]: u for u in by_height[above]}
+        pairs += [(low, left_of_upper[grid[low, 0]]) for low in by_height[height] if grid[low, 0] in left_of_upper]
     return np.asarray(pairs) if pairs else None
 
 
 def is_whole(config: RadarConfig) -> bool:
     """Whether the array tells elevation and has a row of eight antennas, as the IWR1843's with all transmitters."""
     return elevation_pairs(config) is not None and len(azimuth_row(config)) >= ROW
+
+
+def losses(config: RadarConfig) -> list[str]:
+    """What the order in which transmitters fire costs, a sentence each: nothing where each fires once, alone."""
+    found = []
+    several = [firing for firing in config.tx_order if len(fired(firing)) > 1]
+    if several:
+        names = " and ".join(f"TX{t + 1}" for t in fired(several[0]))
+        found.append(
+            f"{names} fire at once and count as one transmitter midway between them: their own directions are lost, of "
+            f"{len(set().union(*map(fired, config.tx_order))) * len(config.rx)} virtual antennas "
+            f"{len(np.unique(_lattice(config), axis=0))} are left, and echoes off the middle of their common beam are "
+            "weaker or of reversed sign"
+        )
+    if len(set(config.tx_order)) < len(config.tx_order):
+        found.append(
+            f"transmitters fire {len(config.tx_order)} chirps a loop, some of them several: the first of each makes "
+            f"the array, and the unambiguous speed is that of the loop, {config.max_velocity:.2f} m/s"
+        )
+    return found

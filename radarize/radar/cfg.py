@@ -1,45 +1,28 @@
 """TI SDK configuration files (``.cfg``): the command lines that the demo firmware takes over UART.
 
-Command syntax: mmWave SDK 3.x user's guide, section "Configuration (.cfg) file format". Commands that concern only the
-on-chip processing (CFAR, angle of arrival, tracking, ...) are ignored.
+Low-power chips have commands of their own (`radarize.radar.lowpower`).
 """
 
-import difflib
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from radarize.io.errors import InputError
 from radarize.io.files import read_bytes
 from radarize.io.jsonfile import parse_json
-from radarize.radar.boards import BOARDS, Board, board_of
-from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
+from radarize.radar.array import losses
+from radarize.radar.boards import BOARDS, Board, likely_board, named_board
+from radarize.radar.commands import Command, commands_of
+from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, Firing, RadarConfig, fired
+from radarize.radar.lowpower import COMMANDS as LOW_POWER
+from radarize.radar.lowpower import parse_low_power
 
-#: Fields of the commands read here, in order.
-FIELDS: dict[str, tuple[str, ...]] = {
-    "dfeDataOutputMode": ("mode",),
-    "channelCfg": ("rxChannelEn", "txChannelEn", "cascading"),
-    "adcCfg": ("numADCBits", "adcOutputFmt"),
-    "adcbufCfg": ("subFrameIdx", "adcOutputFmt", "SampleSwap", "ChanInterleave", "ChirpThreshold"),
-    "profileCfg": tuple(
-        "profileId startFreq idleTime adcStartTime rampEndTime txOutPower txPhaseShifter freqSlopeConst txStartTime "
-        "numAdcSamples digOutSampleRate hpfCornerFreq1 hpfCornerFreq2 rxGain".split()
-    ),
-    "chirpCfg": tuple(
-        "startIdx endIdx profileId startFreqVar freqSlopeVar idleTimeVar adcStartTimeVar txEnable".split()
-    ),
-    "frameCfg": tuple("startIdx endIdx numLoops numFrames framePeriodicity triggerSelect frameTriggerDelay".split()),
-    "bpmCfg": ("subFrameIdx", "isEnabled", "chirp0Idx", "chirp1Idx"),
-    "lvdsStreamCfg": ("subFrameIdx", "enableHeader", "dataFmt", "enableSW"),
-    "compRangeBiasAndRxChanPhase": ("rangeBias", *(f"{p}{i}" for i in range(12) for p in ("re", "im"))),
-    "antPhaseRot": tuple(f"rotation{i}" for i in range(12)),
-}
 REQUIRED = ("dfeDataOutputMode", "channelCfg", "adcCfg", "adcbufCfg", "profileCfg", "chirpCfg", "frameCfg")
 #: Bytes of a file.
 _LARGEST = 1 << 20
-REFUSED = {"advFrameCfg": "advanced frames", "subFrameCfg": "advanced frames", "contModeCfg": "continuous mode"}
+#: Chirps of a loop that do not repeat.
+_MOST_CHIRPS = 64
 
 
 def read_text(path: Path) -> str:
@@ -59,44 +42,8 @@ def read_text(path: Path) -> str:
 
 
 # --- reading ----------------------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Command:
-    """One line of a configuration: values are read by field name, errors say where."""
-
-    file: str
-    line: int
-    name: str
-    values: tuple[str, ...]
-
-    def error(self, field: str, expected: str) -> InputError:
-        value = self.values[FIELDS[self.name].index(field)]
-        return InputError(f"{self.file}, line {self.line}: {self.name} {field} is {value}, expected {expected}")
-
-    def decimal(self, field: str, unit: int = 0) -> float:
-        """A number in units of 10^unit, exact: 122 with unit -6 is the float nearest to 0.000122."""
-        try:
-            value = Decimal(self.values[FIELDS[self.name].index(field)])
-        except InvalidOperation:
-            raise self.error(field, "a number") from None
-        if not value.is_finite() or abs(value) > Decimal("1e30"):
-            raise self.error(field, "a finite number")
-        return float(value.scaleb(unit))
-
-    def integer(self, field: str, low: int = 0, high: int = 2**32 - 1) -> int:
-        value = self.decimal(field)
-        if value != int(value) or not low <= value <= high:
-            raise self.error(field, f"a whole number from {low} to {high}")
-        return int(value)
-
-    def require(self, field: str, allowed: tuple[int, ...], meaning: str) -> int:
-        value = self.integer(field, low=-(2**31))
-        if value not in allowed:
-            raise self.error(field, f"{' or '.join(map(str, allowed))} ({meaning})")
-        return value
-
-
 def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
-    """Read a TI SDK configuration of one TDM-MIMO chirp profile.
+    """Read a TI SDK configuration of one chirp profile.
 
     Args:
         text: content of a ``.cfg`` file.
@@ -104,48 +51,69 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
 
     Raises:
         InputError: with file, line, command and field: a missing or malformed line, or a setting that this project
-            does not cover (real samples, several transmitters at once, several profiles, advanced frames, chirps
-            that vary).
+            does not cover (several profiles, several subframes, chirps that vary).
+
+    Example:
+        >>> from radarize.radar.cfg import parse_cfg, remarks
+        >>> from radarize.radar.presets import load_config
+        >>> _, text = load_config("radarize")
+        >>> config = parse_cfg(text)
+        >>> config.tx_order, remarks(text, config)
+        ((0, 2, 1), [])
     """
     commands: dict[str, list[Command]] = {}
-    for command in _commands(text, name):
+    for command in commands_of(text, name):
         commands.setdefault(command.name, []).append(command)
-    for required in REQUIRED:
+    last = {key: lines[-1] for key, lines in commands.items()}  # the firmware keeps the latest
+    if not LOW_POWER.isdisjoint(last):
+        return parse_low_power(last, _board(text, name), name)
+    if advanced := "advFrameCfg" in last:
+        last["advFrameCfg"].require(
+            "numOfSubFrames", (1,), "advanced frames of a single subframe, which has one profile"
+        )
+    frame_commands = ("advFrameCfg", "subFrameCfg") if advanced else ("frameCfg",)
+    for required in (*REQUIRED[:-1], *frame_commands):
         if required not in commands:
             raise InputError(f"{name}: has no {required} line, expected the commands {', '.join(REQUIRED)}")
-    last = {key: lines[-1] for key, lines in commands.items()}  # the firmware keeps the latest
 
-    last["dfeDataOutputMode"].require("mode", (1,), "plain frames; neither continuous nor advanced ones")
+    frame = _subframe(commands["subFrameCfg"]) if advanced else _frame(last["frameCfg"])
+    mode = "advanced frames" if advanced else "plain frames; neither continuous nor advanced ones"
+    last["dfeDataOutputMode"].require("mode", (3 if advanced else 1,), mode)
     last["adcCfg"].require("numADCBits", (2,), "16 bit")
-    last["adcCfg"].require("adcOutputFmt", (1,), "complex 1x samples")
-    last["adcbufCfg"].require("adcOutputFmt", (0,), "complex samples")
+    real = not last["adcCfg"].require("adcOutputFmt", (0, 1), "real or complex 1x samples")
+    last["adcbufCfg"].require(
+        "adcOutputFmt", (int(real),), f"{'real' if real else 'complex'} samples, as adcCfg has it"
+    )
     last["adcbufCfg"].require("ChanInterleave", (1,), "receivers one after another")
     swap = last["adcbufCfg"].require("SampleSwap", (0, 1), "0 = I first, 1 = Q first")
-    if "bpmCfg" in last:
-        last["bpmCfg"].require("isEnabled", (0,), "no binary phase modulation: one transmitter a chirp")
     if "lvdsStreamCfg" in last:
         last["lvdsStreamCfg"].require("enableHeader", (0,), "samples without headers")
         last["lvdsStreamCfg"].require("dataFmt", (0, 1), "1 = ADC samples alone")
 
     channel = last["channelCfg"]
-    rx = tuple(i for i in range(4) if channel.integer("rxChannelEn", 1, 15) >> i & 1)
+    rx = numbers(channel.integer("rxChannelEn", 1, 255))
     channel.require("cascading", (0,), "a single device")
-    order, profile = _firing(last["frameCfg"], commands["chirpCfg"], commands["profileCfg"], channel)
-    tx_order, repeats = distinct_order(order, f"{name}, line {last['frameCfg'].line}: frameCfg")
-    board = _board(text, profile.decimal("startFreq", 9), name)
+    order, profile = _firing(frame, commands["chirpCfg"], commands["profileCfg"], channel)
+    if "bpmCfg" in last and last["bpmCfg"].integer("isEnabled", 0, 1):
+        (tx_order, bpm), repeats = _modulated(last["bpmCfg"], frame, order), 1
+    else:
+        bpm, where = None, f"{name}, line {frame.command.line}: {frame.command.name}"
+        tx_order, repeats = distinct_order(order, where)
+    start_frequency = profile.decimal("startFreq", 9)
+    samples = profile.integer("numAdcSamples", 2 if real else 1)
     bias, calibration = _calibration(last)
     return RadarConfig.build(
         name,
-        board=board,
-        start_frequency=profile.decimal("startFreq", 9),
+        board=_board(text, name) or likely_board(start_frequency),
+        start_frequency=start_frequency,
         slope=profile.decimal("freqSlopeConst", 12),
         idle_time=profile.decimal("idleTime", -6),
         adc_start_time=profile.decimal("adcStartTime", -6),
         ramp_end_time=profile.decimal("rampEndTime", -6),
-        samples=profile.integer("numAdcSamples", 1),
-        sample_rate=profile.decimal("digOutSampleRate", 3),
-        loops=last["frameCfg"].integer("numLoops", 1) * repeats,
-        frame_period=last["frameCfg"].decimal("framePeriodicity", -3),
+        samples=samples // 2 if real else samples,
+        sample_rate=profile.decimal("digOutSampleRate", 3) / (2 if real else 1),
+        loops=frame.loops * repeats,
+        frame_period=frame.period,
         tx_order=tx_order,
         rx=rx,
         rx_gain_db=profile.integer("rxGain") & 0x3F,  # bits 7:6 select the RF gain target
@@ -154,62 +122,105 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
             HIGH_PASS_1[profile.integer("hpfCornerFreq1", 0, 3)],
             HIGH_PASS_2[profile.integer("hpfCornerFreq2", 0, 3)],
         ),
-        iq_order="qqii" if swap else "iiqq",
+        iq_order="real" if real else "qqii" if swap else "iiqq",
         range_bias=bias,
         channel_calibration=calibration,
+        loop_idle_time=_loop_idle_time(text),
+        bpm=bpm,
     )
 
 
-def _commands(text: str, name: str) -> Iterator[Command]:
-    for number, line in enumerate(text.splitlines(), 1):
-        words = line.split("%")[0].split()
-        if not words:
-            continue
-        word = words[0]
-        if not re.fullmatch(r"[A-Za-z]\w*", word):
-            raise InputError(f"{name}, line {number}: starts with {word[:40]!r}, expected a command such as profileCfg")
-        if word in REFUSED:
-            raise InputError(
-                f"{name}, line {number}: {word} asks for {REFUSED[word]}, expected plain frames (frameCfg)"
-            )
-        if word in FIELDS:
-            count = len(FIELDS[word])
-            if len(words) - 1 != count:
-                raise InputError(
-                    f"{name}, line {number}: {word} has {len(words) - 1} values, expected {count} "
-                    f"({', '.join(FIELDS[word][:14])}{', ...' if count > 14 else ''})"
-                )
-            yield Command(name, number, word, tuple(words[1:]))
-        elif close := difflib.get_close_matches(word, FIELDS, 1, cutoff=0.85):
-            raise InputError(f"{name}, line {number}: unknown command {word}, expected {close[0]}")
+def remarks(text: str, config: RadarConfig) -> list[str]:
+    """What a reader of a configuration should know, a sentence each: the board that was assumed because nothing names
+    one, and what the order of its transmitters costs (`radarize.radar.array.losses`).
+
+    Args:
+        text: of a ``.cfg`` file; nothing is said of the board of another one.
+        config: that was read from it.
+    """
+    found = losses(config)
+    if _is_cfg(text) and _board(text, "configuration") is None:
+        found.insert(0, assumed_board(config))
+    return found
+
+
+def assumed_board(config: RadarConfig) -> str:
+    """Where nothing names the board: which is assumed, and how to say otherwise."""
+    return (
+        f"nothing names the board, whose antennas decide all directions: {config.board} is assumed; --board, or a line "
+        f"'% Board:{config.board}' in the .cfg, says otherwise"
+    )
+
+
+def _is_cfg(text: str) -> bool:
+    return bool(re.search(r"^\s*(profileCfg|chirpComnCfg)\b", text, re.MULTILINE))
+
+
+class Frame(NamedTuple):
+    """Chirps of a frame.
+
+    Attributes:
+        command: that says so.
+        first, end: numbers of a loop's chirps.
+        loops: of them.
+        period: s.
+    """
+
+    command: Command
+    first: int
+    end: int
+    loops: int
+    period: float
+
+
+def _frame(command: Command) -> Frame:
+    if "startIdx" not in command.fields:
+        raise InputError(
+            f"{command.file}, line {command.line}: frameCfg has the {len(command.values)} values of a low-power chip, "
+            f"expected {' and '.join(sorted(LOW_POWER))} beside it"
+        )
+    first = command.integer("startIdx", 0, 511)
+    end = command.integer("endIdx", first, 511)
+    return Frame(command, first, end, command.integer("numLoops", 1), command.decimal("framePeriodicity", -3))
+
+
+def _subframe(subframes: list[Command]) -> Frame:
+    """Of advanced frames: a single subframe of one burst is a plain frame."""
+    command = subframes[-1]
+    for field in ("numOfBurst", "numOfBurstLoops"):
+        command.require(field, (1,), "one burst a subframe: pauses between bursts leave gaps in the Doppler transform")
+    first = command.integer("chirpStartIdx", 0, 511)
+    end = first + command.integer("numOfChirps", 1, 512 - first) - 1
+    return Frame(command, first, end, command.integer("numLoops", 1), command.decimal("subFramePeriodicity", -3))
 
 
 def _firing(
-    frame: Command, chirps: list[Command], profiles: list[Command], channel: Command
-) -> tuple[tuple[int, ...], Command]:
-    """Transmitters of one pass through the frame's chirps, 0-based physical numbers, and the profile they use."""
-    enabled = channel.integer("txChannelEn", 1, 7)
-    first = frame.integer("startIdx", 0, 511)
-    end = frame.integer("endIdx", first, 511)
-    order: list[int] = []
+    frame: Frame, chirps: list[Command], profiles: list[Command], channel: Command
+) -> tuple[tuple[Firing, ...], Command]:
+    """What fires in one pass through the frame's chirps, by 0-based physical numbers, and the profile they use."""
+    enabled = channel.integer("txChannelEn", 1, 255)
+    order: list[Firing] = []
     used: list[int] = []
-    for index in range(first, end + 1):
+    for index in range(frame.first, frame.end + 1):
         matching = [c for c in chirps if c.integer("startIdx", 0, 511) <= index <= c.integer("endIdx", 0, 511)]
         if not matching:
-            raise frame.error("endIdx", f"a chirpCfg line for each chirp {first}...{end}; chirp {index} has none")
+            raise InputError(
+                f"{frame.command.file}, line {frame.command.line}: {frame.command.name} has the chirps "
+                f"{frame.first}...{frame.end}, expected a chirpCfg line for each; chirp {index} has none"
+            )
         chirp = matching[-1]
         for field in ("startFreqVar", "freqSlopeVar", "idleTimeVar", "adcStartTimeVar"):
             if chirp.decimal(field) != 0:
                 raise chirp.error(field, "0 (all chirps alike)")
-        mask = chirp.integer("txEnable", 0, 7)
-        if mask not in (1, 2, 4):
-            raise chirp.error("txEnable", "1, 2 or 4 (one transmitter a chirp)")
-        if not mask & enabled:
-            raise chirp.error("txEnable", f"a transmitter that channelCfg txChannelEn {enabled} enables")
+        mask = chirp.integer("txEnable", 0, 255)
+        if not mask:
+            raise chirp.error("txEnable", "a transmitter at least")
+        if mask & ~enabled:
+            raise chirp.error("txEnable", f"transmitters that channelCfg txChannelEn {enabled} enables")
         if used and chirp.integer("profileId") != used[0]:
             raise chirp.error("profileId", f"{used[0]}, as the frame's other chirps (one profile per frame)")
         used.append(chirp.integer("profileId"))
-        order.append(mask.bit_length() - 1)
+        order.append(firing_of(mask))
     defined = [p for p in profiles if p.integer("profileId", 0, 3) == used[0]]
     if not defined:
         raise chirp.error("profileId", "the number of a profileCfg line")
@@ -218,51 +229,85 @@ def _firing(
     return tuple(order), defined[-1]
 
 
-def distinct_order(order: tuple[int, ...], where: str) -> tuple[tuple[int, ...], int]:
+def numbers(mask: int) -> tuple[int, ...]:
+    """0-based numbers of a mask's antennas."""
+    return tuple(k for k in range(mask.bit_length()) if mask >> k & 1)
+
+
+def firing_of(mask: int) -> Firing:
+    """What fires by a mask of transmitters."""
+    several = numbers(mask)
+    return several[0] if len(several) == 1 else several
+
+
+def distinct_order(order: tuple[Firing, ...], where: str) -> tuple[tuple[Firing, ...], int]:
     """Shortest firing order that, repeated, gives the chirps of a loop; and how often it repeats.
 
     Raises:
-        InputError: a transmitter fires twice within the shortest repetition.
+        InputError: it is too long.
     """
     for length in range(1, len(order) + 1):
         if len(order) % length == 0 and order[:length] * (len(order) // length) == order:
             break
-    if len(set(order[:length])) != length:
-        numbers = ", ".join(f"TX{t + 1}" for t in order)
-        raise InputError(f"{where} fires {numbers} in a loop, expected each transmitter once")
+    if length > _MOST_CHIRPS:
+        raise InputError(f"{where} has {length} chirps until its transmitters repeat, expected at most {_MOST_CHIRPS}")
     return order[:length], len(order) // length
 
 
-def _board(text: str, start_frequency: float, name: str) -> object:
-    """The board that a comment names (``% Board:`` of ours, ``% Platform:`` of TI's visualizer), else by the band. Ours
-    is a name, the path of a board's file, or what that holds, as `write_cfg` has it."""
+def _modulated(command: Command, frame: Frame, order: tuple[Firing, ...]) -> tuple[tuple[Firing, ...], tuple[int, int]]:
+    """Firing order of a loop with binary phase modulation, taken apart: the first of the two transmitters in the place
+    of the chirp with both in phase, the second in that of the chirp with the second one reversed; and these places."""
+    first, second = (command.integer(field, 0, 511) - frame.first for field in ("chirp0Idx", "chirp1Idx"))
+    pairs = {order[slot] if 0 <= slot < len(order) else () for slot in (first, second)}
+    both = fired(pairs.pop()) if len(pairs) == 1 and first != second else ()
+    if len(both) != 2:
+        raise command.error("isEnabled", "0, or two chirps of the loop that fire the same two transmitters")
+    apart = [*order]
+    apart[first], apart[second] = both
+    return tuple(apart), (first, second)
+
+
+def _board(text: str, name: str) -> Any:
+    """The board that a comment names (``% Board:`` of ours, ``% Platform:`` of TI's visualizer), or a command; None if
+    nothing does. Ours is a name, the path of a board's file, or what that holds, as `write_cfg` has it."""
     if found := re.search(r"^%\s*Board:[ \t]*(\S.*?)\s*$", text, re.MULTILINE):
         if found[1].startswith("{"):
             return parse_json(found[1], f"{name}: Board")
         beside = Path(name).parent / found[1]
         return beside if found[1] not in BOARDS and beside.is_file() else found[1]
-    platform = re.search(r"^%\s*Platform:\s*(\S+)", text, re.MULTILINE)
-    return board_of(platform[1] if platform else "", start_frequency)
+    platform = re.search(r"^(?:%\s*Platform:|antGeometryBoard)\s*(\S+)", text, re.MULTILINE)
+    return named_board(platform[1]) if platform else None
 
 
-def _backoff(profile: Command, tx_order: tuple[int, ...]) -> float:
+def _loop_idle_time(text: str) -> float:
+    """Of a comment of ours, s: the SDK's chips have none."""
+    found = re.search(r"^%\s*LoopIdleTime:\s*(\d+\.?\d*)\s*$", text, re.MULTILINE)
+    return float(Decimal(found[1]).scaleb(-6)) if found else 0.0
+
+
+def _backoff(profile: Command, tx_order: tuple[Firing, ...]) -> float:
     code = profile.integer("txOutPower")
-    steps = {code >> 8 * t & 0xFF for t in tx_order}  # one byte per transmitter, dB
+    steps = {code >> 8 * t & 0xFF for firing in tx_order for t in fired(firing)}  # one byte per transmitter, dB
     if len(steps) > 1:
         raise profile.error("txOutPower", "the same back-off for all transmitters in use")
     return steps.pop()
 
 
-def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, float], ...]]:
-    factors = [1 + 0j] * 12  # not measured
+def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, float], ...] | None]:
+    """Range bias, m, and factors of all the board's channels; None: not measured."""
+    factors: list[complex] = []
     bias = 0.0
     if command := last.get("compRangeBiasAndRxChanPhase"):
         bias = command.decimal("rangeBias")
-        factors = [complex(command.decimal(f"re{i}"), command.decimal(f"im{i}")) for i in range(12)]
+        pairs = range(len(command.fields) // 2)
+        factors = [complex(command.decimal(f"re{i}"), command.decimal(f"im{i}")) for i in pairs]
     if command := last.get("antPhaseRot"):  # people-counting firmware: signs of the receivers' feeds
-        signs = [command.require(f"rotation{i}", (-1, 1), "in or out of phase") for i in range(12)]
+        signs = [command.require(field, (-1, 1), "in or out of phase") for field in command.fields]
+        factors = factors or [1 + 0j] * len(signs)
+        if len(factors) != len(signs):
+            raise command.error("rotation0", f"a sign for each of the {len(factors)} channels that are calibrated")
         factors = [s * f for s, f in zip(signs, factors, strict=True)]
-    return bias, tuple((f.real, f.imag) for f in factors)
+    return bias, tuple((f.real, f.imag) for f in factors) or None
 
 
 # --- writing ----------------------------------------------------------------------------------------------------------
@@ -277,26 +322,37 @@ def write_cfg(config: RadarConfig) -> str:
     hpf1 = _code("high_pass[0]", config.high_pass[0], HIGH_PASS_1)
     hpf2 = _code("high_pass[1]", config.high_pass[1], HIGH_PASS_2)
     rx_mask = sum(1 << i for i in config.rx)
-    tx_mask = sum(1 << i for i in config.tx)
+    tx_mask = sum(1 << i for i in {t for firing in config.tx_order for t in fired(firing)})
+    real = config.iq_order == "real"
+    order = list(config.tx_order)
+    if config.bpm:
+        together = tuple(t for slot in config.bpm for t in fired(config.tx_order[slot]))
+        order[config.bpm[0]] = order[config.bpm[1]] = together
     profile = (
         f"{_text(config.start_frequency, -9)} {_text(config.idle_time, 6)} {_text(config.adc_start_time, 6)} "
-        f"{_text(config.ramp_end_time, 6)} {sum(backoff << 8 * t for t in config.tx)} 0 {_text(config.slope, -12)} 1 "
-        f"{config.samples} {_text(config.sample_rate, -3)} {hpf1} {hpf2} {gain}"
+        f"{_text(config.ramp_end_time, 6)} {sum(backoff << 8 * t for t in numbers(tx_mask))} 0 "
+        f"{_text(config.slope, -12)} 1 "
+        f"{config.samples * (1 + real)} {_text(config.sample_rate * (1 + real), -3)} {hpf1} {hpf2} {gain}"
     )
     factors = " ".join(f"{_text(factor.real)} {_text(factor.imag)}" for factor in config.channel_factors.ravel())
     board = config.board.model_dump_json() if isinstance(config.board, Board) else config.board
     swap = int(config.iq_order == "qqii")
     lines = [
         f"% Board:{board}",
+        *([f"% LoopIdleTime:{_text(config.loop_idle_time, 6)}"] if config.loop_idle_time else []),
         "sensorStop",
         "flushCfg",
         "dfeDataOutputMode 1",
         f"channelCfg {rx_mask} {tx_mask} 0",
-        "adcCfg 2 1",
-        f"adcbufCfg -1 0 {swap} 1 1",
+        f"adcCfg 2 {int(not real)}",
+        f"adcbufCfg -1 {int(real)} {swap} 1 1",
         f"profileCfg 0 {profile}",
-        *(f"chirpCfg {slot} {slot} 0 0 0 0 0 {1 << tx}" for slot, tx in enumerate(config.tx_order)),
+        *(
+            f"chirpCfg {slot} {slot} 0 0 0 0 0 {sum(1 << tx for tx in fired(firing))}"
+            for slot, firing in enumerate(order)
+        ),
         f"frameCfg 0 {len(config.tx_order) - 1} {config.loops} 0 {_text(config.frame_period, 3)} 1 0",
+        *([f"bpmCfg -1 1 {config.bpm[0]} {config.bpm[1]}"] if config.bpm else []),
         "lowPower 0 0",
         "guiMonitor -1 0 0 0 0 0 0",
         "cfarCfg -1 0 2 8 4 3 0 15 1",

@@ -15,9 +15,28 @@ SPEED_OF_LIGHT = 299_792_458.0
 #: High-pass corner frequencies (Hz) that the codes 0-3 of a profile select (data sheet SWRS228).
 HIGH_PASS_1 = (175e3, 235e3, 350e3, 700e3)
 HIGH_PASS_2 = (350e3, 700e3, 1.4e6, 2.8e6)
+#: Chirps of a loop.
+_MOST_CHIRPS = 512
 #: Bytes of a frame: what the largest of the limits below would make together is no radar's.
 _LARGEST = 64 << 20
 Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+#: What fires in a chirp: a transmitter's number, or the numbers of several that fire at once.
+Firing = int | tuple[int, ...]
+
+
+def fired(firing: Firing) -> tuple[int, ...]:
+    """Numbers of the transmitters that fire in a chirp."""
+    return (firing,) if isinstance(firing, int) else firing
+
+
+def antennas(count: int) -> str:
+    """Numbers of so many antennas, as errors name them."""
+    return ", ".join(map(str, range(count)))
+
+
+def _receivers(fields: dict[str, Any]) -> tuple[int, ...]:
+    """All that the board has."""
+    return tuple(range(len(load_board(fields["board"]).rx))) if "board" in fields else ()
 
 
 class RadarConfig(BaseModel):
@@ -36,16 +55,23 @@ class RadarConfig(BaseModel):
         sample_rate: Hz, complex-1x.
         loops: repetitions of the transmitter sequence per frame.
         frame_period: s, start to start.
-        tx_order: transmitters in firing order, 0-based physical numbers (TX1 is 0).
-        rx: enabled receivers, 0-based physical numbers, ascending.
+        tx_order: transmitters in firing order, 0-based physical numbers (TX1 is 0). One that fires several times in a
+            loop is listed as often, and has a place of its own on the tx axis each time; several that fire at once are
+            listed as a tuple, and count as one transmitter midway between them.
+        rx: enabled receivers, 0-based physical numbers, ascending; all of the board if not given.
+        loop_idle_time: pause after a loop's last chirp, s (low-power chips: what a burst's period leaves).
+        bpm: slots, 0-based, of the two chirps by which two transmitters were sent in binary phase modulation: their sum
+            in the first and their difference in the second. `radarize.radar.dca1000` takes them apart, so that samples
+            are those of `tx_order`, one transmitter after the other. None: none were.
         rx_gain_db: receive gain, dB.
         tx_backoff_db: transmit power below maximum, dB.
         high_pass: corner frequencies of the two high-pass stages, Hz.
-        iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo).
+        iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo); or
+            ``"real"``: twice as many real samples at twice the rate, of which the complex ones are made.
         range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
-        channel_calibration: measured complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, then TX2,
-            TX3. None: not measured, and the board's nominal one applies, which takes its receivers' signs off. Twelve
-            ones, which TI's files hold before anybody has measured, count as None.
+        channel_calibration: measured complex factor per *physical* (tx, rx) of the board as (re, im) pairs: TX1 x RX1,
+            RX2, ..., then TX2, ... None: not measured, and the board's nominal one applies, which takes its antennas'
+            signs off. Ones, which TI's files hold before anybody has measured, count as None.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -61,14 +87,17 @@ class RadarConfig(BaseModel):
     sample_rate: float = Field(ge=1e3, le=1e12)
     loops: int = Field(gt=0, le=1 << 12)
     frame_period: float = Field(ge=1e-9, le=1e4)
-    tx_order: tuple[int, ...] = Field(min_length=1, max_length=3)
-    rx: tuple[int, ...] = Field((0, 1, 2, 3), min_length=1, max_length=4)
+    tx_order: tuple[Firing, ...] = Field(min_length=1, max_length=_MOST_CHIRPS)
+    rx: tuple[int, ...] = Field(default_factory=_receivers, min_length=1)
     rx_gain_db: float = Field(30.0, ge=-1000, le=1000)
     tx_backoff_db: float = Field(0.0, ge=-1000, le=1000)
     high_pass: tuple[float, float] = (HIGH_PASS_1[0], HIGH_PASS_2[0])
-    iq_order: Literal["iiqq", "qqii"] = "qqii"
+    iq_order: Literal["iiqq", "qqii", "real"] = "qqii"
     range_bias: float = Field(0.0, ge=-1000, le=1000)
     channel_calibration: tuple[tuple[Factor, Factor], ...] | None = None
+    # Of captures by some radars only: other recordings do not mention them.
+    loop_idle_time: float = Field(0.0, ge=0, le=10, exclude_if=lambda value: value == 0)
+    bpm: tuple[int, int] | None = Field(None, exclude_if=lambda value: value is None)
 
     @field_validator("board", mode="before")
     @classmethod
@@ -82,18 +111,31 @@ class RadarConfig(BaseModel):
     @field_validator("channel_calibration")
     @classmethod
     def _measured(cls, pairs: tuple[tuple[float, float], ...] | None, info: ValidationInfo) -> object:
-        if pairs == ((1.0, 0.0),) * 12:
+        if pairs is not None and set(pairs) == {(1.0, 0.0)}:
             return None
         return None if "board" in info.data and pairs == load_board(info.data["board"]).nominal_calibration else pairs
 
     @model_validator(mode="after")
     def _consistent(self) -> "RadarConfig":
-        if len(set(self.tx_order)) != len(self.tx_order) or not set(self.tx_order) <= {0, 1, 2}:
-            raise ValueError(f"tx_order is {self.tx_order}, expected distinct numbers of 0, 1, 2")
-        if tuple(sorted(set(self.rx))) != self.rx or not set(self.rx) <= {0, 1, 2, 3}:
-            raise ValueError(f"rx is {self.rx}, expected ascending distinct numbers of 0, 1, 2, 3")
-        if self.channel_calibration is not None and len(self.channel_calibration) != 12:
-            raise ValueError(f"channel_calibration has {len(self.channel_calibration)} pairs, expected 12")
+        board = load_board(self.board)
+        for name, count, numbers in (
+            ("tx_order", len(board.tx), {t for firing in self.tx_order for t in fired(firing) or (-1,)}),
+            ("rx", len(board.rx), set(self.rx)),
+        ):
+            if not numbers <= set(range(count)):
+                raise ValueError(
+                    f"{name} is {getattr(self, name)}, expected numbers of {antennas(count)} on the {board}"
+                )
+        if tuple(sorted(set(self.rx))) != self.rx:
+            raise ValueError(f"rx is {self.rx}, expected ascending distinct numbers of {antennas(len(board.rx))}")
+        channels = len(board.tx) * len(board.rx)
+        if self.channel_calibration is not None and len(self.channel_calibration) != channels:
+            raise ValueError(f"channel_calibration has {len(self.channel_calibration)} pairs, expected {channels}")
+        if self.bpm is not None:
+            slots = dict(enumerate(self.tx_order))
+            first, second = (slots.get(slot) for slot in self.bpm)
+            if not (isinstance(first, int) and isinstance(second, int) and first < second):
+                raise ValueError(f"bpm is {self.bpm}, expected the slots of two transmitters, by ascending number")
         if self.frame_bytes > _LARGEST:
             raise ValueError(
                 f"a frame of {self.loops} loops x {len(self.tx)} TX x {len(self.rx)} RX x {self.samples} samples has "
@@ -146,14 +188,25 @@ class RadarConfig(BaseModel):
 
     # --- array -----------------------------------------------------------------------------------------------------
     @property
-    def tx(self) -> tuple[int, ...]:
+    def tx(self) -> tuple[Firing, ...]:
         """Enabled transmitters in physical order, the order of the tx axis of every decoded array."""
-        return tuple(sorted(self.tx_order))
+        return tuple(self.tx_order[slot] for slot in self.slot)
 
     @property
     def slot(self) -> tuple[int, ...]:
         """TDM slot (0 = fires first) of each transmitter of `tx`."""
-        return tuple(self.tx_order.index(t) for t in self.tx)
+        return tuple(sorted(range(len(self.tx_order)), key=lambda slot: fired(self.tx_order[slot])))
+
+    @property
+    def turn(self) -> tuple[int, ...]:
+        """Place on the tx axis of what fires in each slot: the inverse of `slot`."""
+        return tuple(sorted(range(len(self.slot)), key=self.slot.__getitem__))
+
+    @property
+    def channels(self) -> tuple[np.ndarray, ...]:
+        """Index of the enabled channels in an array of all the board's (tx, rx). Transmitters that fire at once have
+        the first one's: a factor that all receivers share changes no direction."""
+        return np.ix_([fired(firing)[0] for firing in self.tx], self.rx)
 
     @property
     def frame_shape(self) -> tuple[int, int, int, int, int]:
@@ -210,7 +263,12 @@ class RadarConfig(BaseModel):
     @property
     def loop_time(self) -> float:
         """Repetition interval of one transmitter, s."""
-        return self.chirp_time * len(self.tx_order)
+        return self.chirp_time * len(self.tx_order) + self.loop_idle_time
+
+    @property
+    def chirps_per_loop(self) -> float:
+        """Length of a loop in chirp cycles, its pause included."""
+        return len(self.tx_order) + self.loop_idle_time / self.chirp_time
 
     @property
     def burst_time(self) -> float:
@@ -220,8 +278,9 @@ class RadarConfig(BaseModel):
     @property
     def chirp_times(self) -> Float[np.ndarray, "loop tx"]:
         """Middle of each chirp's ADC window after the frame's stamp, s, transmitters in physical order."""
-        slots = np.arange(self.loops)[:, None] * len(self.tx_order) + np.asarray(self.slot)
-        return slots * self.chirp_time + self.idle_time + self.adc_center_time
+        loops, slots = np.arange(self.loops)[:, None], np.asarray(self.slot)
+        chirps = (loops * len(slots) + slots) * self.chirp_time + loops * self.loop_idle_time
+        return chirps + self.idle_time + self.adc_center_time
 
     @property
     def burst_center(self) -> float:
@@ -260,10 +319,11 @@ class RadarConfig(BaseModel):
     @property
     def calibration(self) -> np.ndarray:
         """Complex factor per enabled (tx, rx), to be multiplied onto decoded samples."""
-        return self.channel_factors[np.ix_(self.tx, self.rx)]
+        return self.channel_factors[self.channels]
 
     @property
-    def channel_factors(self) -> Complex[np.ndarray, "3 4"]:
-        """The same of all physical (tx, rx): measured, or the board's nominal ones."""
-        pairs = self.channel_calibration or load_board(self.board).nominal_calibration
-        return np.array([complex(*pair) for pair in pairs]).reshape(3, 4)
+    def channel_factors(self) -> Complex[np.ndarray, "tx rx"]:
+        """The same of all the board's (tx, rx): measured, or its nominal ones."""
+        board = load_board(self.board)
+        pairs = self.channel_calibration or board.nominal_calibration
+        return np.array([complex(*pair) for pair in pairs]).reshape(len(board.tx), len(board.rx))

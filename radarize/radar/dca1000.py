@@ -2,13 +2,15 @@
 
 Two-lane LVDS, complex samples (TI SWRA581, SPRUIJ4): per chirp all samples of the first receiver, then the second, ...;
 words of 16 bits in groups of four, two complex samples: ``I0 I1 Q0 Q1`` (mmWave Studio) or ``Q0 Q1 I0 I1`` (SDK demo).
+Chips without complex samples send a word for each real one. Real samples are made complex, and transmitters that were
+sent in binary phase modulation are taken apart: what is decoded is the same for all.
 """
 
 import struct
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int16
+from jaxtyping import Complex, Float, Int16
 
 from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
@@ -48,15 +50,21 @@ def decode(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> Int16[np.ndar
             f"{raw.size} words are {raw.size / words:.3f} frames, expected a multiple of {words} "
             f"({loops} loops x {tx} TX x {rx} RX x {samples} samples x 2)"
         )
-    chirps = raw.reshape(-1, loops, tx, rx, samples // 2, 2, 2)  # ..., group, iq, sample of the pair
-    if config.iq_order == "qqii":
-        chirps = chirps[..., ::-1, :]
+    if config.iq_order == "real":
+        chirps = _analytic(raw.reshape(-1, loops, tx, rx, 2 * samples))
+    else:
+        chirps = raw.reshape(-1, loops, tx, rx, samples // 2, 2, 2)  # ..., group, iq, sample of the pair
+        if config.iq_order == "qqii":
+            chirps = chirps[..., ::-1, :]
+        chirps = chirps.swapaxes(-1, -2)
     physical = chirps if config.slot == tuple(range(tx)) else chirps[:, :, list(config.slot)]
-    return np.ascontiguousarray(physical.swapaxes(-1, -2)).reshape(-1, loops, tx, rx, samples, 2)
+    frames = np.ascontiguousarray(physical).reshape(-1, loops, tx, rx, samples, 2)
+    return _demodulated(frames, config) if config.bpm else frames
 
 
 def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig) -> Int16[np.ndarray, "word"]:
-    """The words that a DCA1000 would have captured: the inverse of `decode`.
+    """The words that a DCA1000 would have captured: the inverse of `decode` (to a count, of real samples and of binary
+    phase modulation).
 
     Raises:
         InputError: the frames do not have the configuration's shape, or `samples` is odd.
@@ -65,11 +73,67 @@ def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: Radar
     if frames.shape[1:] != config.frame_shape:
         raise InputError(f"frames have shape {frames.shape[1:]}, expected {config.frame_shape}")
     loops, tx, rx, samples, _ = config.frame_shape
-    fired = frames[:, :, [config.tx.index(t) for t in config.tx_order]]
+    if config.bpm:
+        frames = _demodulated(frames, config, inverse=True)
+    fired = frames[:, :, list(config.turn)]
+    if config.iq_order == "real":
+        return _real(fired).reshape(-1)
     groups = fired.reshape(-1, loops, tx, rx, samples // 2, 2, 2).swapaxes(-1, -2)
     if config.iq_order == "qqii":
         groups = groups[..., ::-1, :]
     return np.ascontiguousarray(groups, dtype=np.int16).reshape(-1)
+
+
+def _analytic(real: Int16[np.ndarray, "... sample"]) -> Int16[np.ndarray, "... half 2"]:
+    """Complex samples of the same beats: the upper half of their spectrum mirrors the lower one, and is dropped."""
+    spectrum = np.fft.rfft(real.astype(np.float32), axis=-1)[..., :-1]
+    spectrum[..., 0] /= 2
+    return _counts(np.fft.ifft(spectrum, axis=-1))
+
+
+def _real(iq: Int16[np.ndarray, "... half 2"]) -> Int16[np.ndarray, "... sample"]:
+    """Real samples of the same beats: the inverse of `_analytic`."""
+    spectrum = np.fft.fft(iq[..., 0] + 1j * iq[..., 1], axis=-1)
+    spectrum[..., 0] *= 2
+    return _rounded(np.fft.irfft(spectrum, 2 * iq.shape[-2], axis=-1))
+
+
+def _demodulated(
+    frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig, inverse: bool = False
+) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
+    """Frames with the two transmitters of binary phase modulation taken apart, each as if it had fired alone in its
+    chirp; or put together again.
+
+    One chirp has the sum of both transmitters' echoes, the other one their difference, a little later. Before they are
+    added, each is moved to the other's instant by a turn of its Doppler spectrum, as TI's demos do: right for speeds
+    within `config.max_velocity`. Where an echo does not end a burst with the phase at which it began it, the first and
+    last loops keep a rest of the other transmitter, 25 dB or more below it once the loops are windowed.
+    """
+    assert config.bpm is not None
+    places = [config.turn[slot] for slot in config.bpm]
+    first, second = (frames[:, :, place, ..., 0] + 1j * frames[:, :, place, ..., 1] for place in places)
+    later = (config.bpm[1] - config.bpm[0]) * config.chirp_time / config.loop_time
+    cycles = np.fft.fftfreq(config.loops)[:, None, None] * later
+
+    def moved(chirps: np.ndarray, sign: int) -> np.ndarray:
+        """To later (1) or earlier (-1) by the time between the two chirps."""
+        return np.fft.ifft(np.fft.fft(chirps, axis=1) * np.exp(sign * 2j * np.pi * cycles), axis=1)
+
+    scale = 1.0 if inverse else 0.5
+    apart = scale * (first + moved(second, -1)), scale * (moved(first, 1) - second)
+    result = frames.copy()
+    for place, chirps in zip(places, apart, strict=True):
+        result[:, :, place] = _counts(chirps)
+    return result
+
+
+def _counts(signal: Complex[np.ndarray, "..."]) -> Int16[np.ndarray, "... 2"]:
+    return _rounded(np.stack([signal.real, signal.imag], axis=-1))
+
+
+def _rounded(values: Float[np.ndarray, "..."]) -> Int16[np.ndarray, "..."]:
+    limits = np.iinfo(np.int16)
+    return values.round().clip(limits.min, limits.max).astype(np.int16)
 
 
 def range_balance(frames: Int16[np.ndarray, "frame loop tx rx sample 2"]) -> float:

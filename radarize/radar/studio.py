@@ -8,9 +8,9 @@ from pathlib import Path
 
 from radarize.io.errors import InputError
 from radarize.io.jsonfile import parse_json
-from radarize.radar.boards import board_of
-from radarize.radar.cfg import distinct_order, read_text
-from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
+from radarize.radar.boards import likely_board, named_board
+from radarize.radar.cfg import distinct_order, firing_of, numbers, read_text
+from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, Firing, RadarConfig, fired
 
 
 def load_studio(path: Path, setup: Path | None = None) -> tuple[RadarConfig, str]:
@@ -41,7 +41,7 @@ def load_json(path: Path) -> dict:
 
 
 def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> RadarConfig:
-    """Read mmWave Studio settings of one TDM-MIMO chirp profile.
+    """Read mmWave Studio settings of one chirp profile.
 
     Args:
         text: content of a ``.mmwave.json`` file.
@@ -59,7 +59,7 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
         raise rf.error("waveformType", waveform, "legacyFrameChirp (plain frames)")
     output = rf.node("rlAdcOutCfg_t").node("fmt")
     output.require("b2AdcBits", (2,), "16 bit")
-    output.require("b2AdcOutFmt", (1,), "complex 1x samples")
+    real = not output.require("b2AdcOutFmt", (0, 1), "real or complex 1x samples")
     data_format = capture.node("rlDevDataFmtCfg_t")
     swap = data_format.require("iqSwapSel", (0, 1), "0 = I first, 1 = Q first")
     data_format.require("chInterleave", (1,), "receivers one after another")
@@ -73,33 +73,34 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
     start_frequency = profile.decimal("startFreqConst_GHz", 9)
     return RadarConfig.build(
         name,
-        board=board_of(device, start_frequency),
+        board=named_board(device) or likely_board(start_frequency),
         start_frequency=start_frequency,
         slope=profile.decimal("freqSlopeConst_MHz_usec", 12),
         idle_time=profile.decimal("idleTimeConst_usec", -6),
         adc_start_time=profile.decimal("adcStartTimeConst_usec", -6),
         ramp_end_time=profile.decimal("rampEndTime_usec", -6),
-        samples=profile.integer("numAdcSamples"),
-        sample_rate=profile.decimal("digOutSampleRate", 3),
+        samples=profile.integer("numAdcSamples") // (2 if real else 1),
+        sample_rate=profile.decimal("digOutSampleRate", 3) / (2 if real else 1),
         loops=frame.integer("numLoops") * repeats,
         frame_period=frame.decimal("framePeriodicity_msec", -3),
         tx_order=tx_order,
-        rx=tuple(i for i in range(4) if rx_mask >> i & 1),
+        rx=numbers(rx_mask),
         rx_gain_db=profile.integer("rxGain_dB") & 0x3F,
-        tx_backoff_db=profile.integer("txOutPowerBackoffCode") >> 8 * tx_order[0] & 0xFF,
+        tx_backoff_db=profile.integer("txOutPowerBackoffCode") >> 8 * fired(tx_order[0])[0] & 0xFF,
         high_pass=(
             HIGH_PASS_1[profile.require("hpfCornerFreq1", (0, 1, 2, 3), "a corner code")],
             HIGH_PASS_2[profile.require("hpfCornerFreq2", (0, 1, 2, 3), "a corner code")],
         ),
-        iq_order="qqii" if swap else "iiqq",
+        iq_order="real" if real else "qqii" if swap else "iiqq",
     )
 
 
-def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[int, ...], "_Node"]:
+def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[Firing, ...], "_Node"]:
     """Transmitters of one pass through the frame's chirps, and the profile they use."""
     profiles = [p.node("rlProfileCfg_t") for p in rf.items("rlProfiles")]
     chirps = [c.node("rlChirpCfg_t") for c in rf.items("rlChirps")]
-    order, used = [], set()
+    order: list[Firing] = []
+    used: set[int] = set()
     first, end = frame.integer("chirpStartIdx"), frame.integer("chirpEndIdx")
     for index in range(first, min(end, 511) + 1):
         matching = [c for c in chirps if c.integer("chirpStartIdx") <= index <= c.integer("chirpEndIdx")]
@@ -109,7 +110,9 @@ def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[int, ...], "_Node"]:
         for field in ("startFreqVar_MHz", "freqSlopeVar_KHz_usec", "idleTimeVar_usec", "adcStartTimeVar_usec"):
             if chirp.decimal(field) != 0:
                 raise chirp.error(field, chirp.get(field), "0 (all chirps alike)")
-        order.append(chirp.require("txEnable", (1, 2, 4), "one transmitter a chirp").bit_length() - 1)
+        if not (mask := chirp.integer("txEnable")):
+            raise chirp.error("txEnable", 0, "a transmitter at least")
+        order.append(firing_of(mask))
         used.add(chirp.integer("profileId"))
     matching = [p for p in profiles if p.integer("profileId") in used]
     if len(used) != 1 or not matching:

@@ -51,7 +51,7 @@ class Aliases:
         centres = np.unique(np.rint(np.linspace(-most, most, min(2 * most + 1, _MOST))))
         centres = centres[np.argsort(np.abs(centres), kind="stable")]
         self._windows = np.rint((centres[:, None] - bins) / config.loops).astype(int)
-        turns = 2 * np.pi * later[:, None, None] * self._windows / len(slots)
+        turns = 2 * np.pi * later[:, None, None] * self._windows / config.chirps_per_loop
         self._turns = np.exp(1j * turns).transpose(1, 0, 2).reshape(len(centres), -1)
 
     def of(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Int[np.ndarray, "frame doppler"]:

@@ -128,7 +128,8 @@ class Heatmaps:
         """A spectrum whose bins mean speeds so many unambiguous spans higher, with the TDM delays of these."""
         if not aliases.any():
             return spectrum
-        turn = 2 * np.pi * aliases[..., None] * np.repeat(self.config.slot, len(self.config.rx)) / len(self.config.slot)
+        turn = 2 * np.pi * aliases[..., None] * np.repeat(self.config.slot, len(self.config.rx))
+        turn = turn / self.config.chirps_per_loop
         return spectrum * self._tensor(np.exp(1j * turn), torch.complex64)[:, None]
 
     def _loop_weights(self, frames: int, valid: np.ndarray | None) -> torch.Tensor:
@@ -211,7 +212,7 @@ class Heatmaps:
         if self.pairs is None or self._pair_steering is None:
             raise InputError(
                 f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of "
-                "different height, expected all three transmitters for elevation"
+                "different height, expected transmitters or receivers in two rows for elevation"
             )
         return spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1), self._pair_steering
 

@@ -7,7 +7,7 @@ The steps of the mmWave SDK 3.x demo (`Mmwave demo data processing chain`), with
     -> CFAR over range (smallest of both sides), and over Doppler (mean of both sides)
     -> only the peaks among their neighbours -> delays between transmitters turned back at the cell's speed
     -> azimuth transform of the longest row, its peak and perhaps a second one
-    -> elevation from the phase between that row and the one half a wavelength above or below
+    -> elevation from the phase between that row and the nearest one above or below
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ from scipy.ndimage import maximum_filter
 
 from radarize.io.errors import InputError
 from radarize.io.plain import Frozen
-from radarize.radar.array import azimuth_row, rows, virtual_positions
+from radarize.radar.array import azimuth_row, row_beside, rows, virtual_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.windows import periodic
 from radarize.signal.heatmaps import Heatmaps
@@ -111,7 +111,8 @@ class PointClouds:
         self._row = azimuth_row(config)
         by_height = {height: members for height, members in rows(config).items() if len(members) > 1}
         height = next(h for h, members in rows(config).items() if members[0] == self._row[0])
-        self._other = by_height.get(height + 1.0, by_height.get(height - 1.0))
+        beside = row_beside(by_height, height)
+        self._other = None if beside is None else by_height[beside]
         phase = -2j * np.pi / config.wavelength
         self._steering = np.exp(-phase * place[self._row, 1][:, None] * self.u_y)
         if self._other is not None:

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from radarize.io.errors import InputError
-from radarize.radar.cfg import FIELDS, parse_cfg
+from radarize.radar.cfg import parse_cfg
+from radarize.radar.commands import FIELDS
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 

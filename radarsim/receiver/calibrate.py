@@ -164,8 +164,8 @@ class _Static:
     def relative(self, scale: float, config: RadarConfig) -> tuple[float, tuple[Channel, ...]]:
         """Level (dB) and amplitudes of all channels as settings; `scale` is counts per unit of amplitude."""
         mean = np.sqrt(np.mean(np.abs(self.counts) ** 2)) / scale
-        whole = np.full((3, 4), mean, complex)
-        whole[np.ix_(config.tx, config.rx)] = self.counts / scale
+        whole = np.full(config.channel_factors.shape, mean, complex)
+        whole[config.channels] = self.counts / scale
         return round(float(20 * np.log10(mean)), 2), tuple(Channel.of(c) for c in whole.ravel())
 
 
@@ -240,8 +240,8 @@ def fit_channels(
             f"no echo outshines all others of its range (best: {best} of the power, needed {100 * DOMINANCE:.0f} %): "
             "mismatch left to the data sheet's bounds"
         )
-    whole = np.ones((3, 4), complex)
-    whole[np.ix_(config.tx, config.rx)] = channel.reshape(len(config.tx), len(config.rx))
+    whole = np.ones(config.channel_factors.shape, complex)
+    whole[config.channels] = channel.reshape(len(config.tx), len(config.rx))
     gain, phase = 20 * np.log10(np.abs(channel)), np.rad2deg(np.angle(channel))
     return Mismatch(channels=[Channel.of(c) for c in whole.ravel()]), (
         f"channels from {len(dominant)} snapshots of single echoes: gain within {np.abs(gain).max():.2f} dB, phase "
@@ -256,9 +256,9 @@ def _snapshots(
     loops, n = signal.shape[1], config.samples
     slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
-    cycles = np.fft.fftfreq(loops)[:, None] * np.array(config.slot) / len(config.slot)  # a slot's share of a loop
+    cycles = np.fft.fftfreq(loops)[:, None] * np.array(config.slot) / config.chirps_per_loop  # a slot's share of a loop
     cube = cube * np.exp(-2j * np.pi * cycles)[:, :, None, None]
-    cube = cube * np.asarray(load_board(config.board).rx_sign)[list(config.rx)][:, None]
+    cube = cube * load_board(config.board).signs[config.channels][:, :, None]
     power = np.sum(np.abs(cube) ** 2, axis=(2, 3))
     far = config.ranges > 0.3  # nearer is leakage, or no plane wave
     noise = floor * cube.shape[2] * cube.shape[3] * np.sum(slow**2) * np.sum(fast**2)

@@ -16,8 +16,9 @@ import numpy as np
 import scipy.fft
 from jaxtyping import Complex, Float, Int16
 
+from radarize.io.errors import InputError
 from radarize.radar.boards import load_board
-from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
 from radarsim.receiver.frontend_config import FrontEndConfig, MountEcho
 from radarsim.receiver.phasenoise import Skirts
 
@@ -50,10 +51,13 @@ class FrontEnd:
         rng: np.random.Generator | None = None,
     ):
         self.config, self.settings = config, settings or FrontEndConfig.of(config.board)
+        if any(len(fired(firing)) > 1 for firing in config.tx_order):
+            raise InputError(f"radar: tx_order is {config.tx_order}, expected one transmitter a chirp to simulate")
+        self._board = load_board(config.board)
         rng = np.random.default_rng(0) if rng is None else rng
-        enabled = np.ix_(config.tx, config.rx)
-        # Some boards feed receivers from the far side of the patch.
-        self.channel = (self._draw_channel(rng) * load_board(config.board).rx_sign)[enabled]
+        enabled = config.channels
+        # Some boards feed antennas from the far side of the patch.
+        self.channel = (self._draw_channel(rng) * self._board.signs)[enabled]
         self.leakage = self._draw_leakage(rng)[enabled]
         echoes = [self._draw_mount(echo, rng)[enabled] for echo in self.settings.mount or ()]
         self.mount = np.array(echoes, complex).reshape(-1, *self.leakage.shape)
@@ -63,26 +67,32 @@ class FrontEnd:
             response = np.abs(self.beat_response(self._bins))
             self._skirts = Skirts(config, self.settings.phase_noise, response)
 
-    def _draw_channel(self, rng: np.random.Generator) -> Complex[np.ndarray, "3 4"]:
-        mismatch = self.settings.mismatch
-        errors = rng.uniform(-0.5, 0.5, (2, 7))  # drawn in any case: the same seed gives the same board
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """Transmitters and receivers of the board, enabled or not."""
+        return len(self._board.tx), len(self._board.rx)
+
+    def _draw_channel(self, rng: np.random.Generator) -> Complex[np.ndarray, "tx rx"]:
+        mismatch, (tx, rx) = self.settings.mismatch, self._shape
+        errors = rng.uniform(-0.5, 0.5, (2, tx + rx))  # drawn in any case: the same seed gives the same board
         if mismatch is None:
-            return np.ones((3, 4), complex)
+            return np.ones((tx, rx), complex)
         if mismatch.channels:
-            return mismatch.measured
+            return mismatch.measured(self._board)
         factor = 10 ** (mismatch.gain_db * errors[0] / 20) * np.exp(1j * np.deg2rad(mismatch.phase_deg) * errors[1])
-        return factor[:3, None] * factor[None, 3:]
+        return factor[:tx, None] * factor[None, tx:]
 
-    def _draw_leakage(self, rng: np.random.Generator) -> Complex[np.ndarray, "3 4"]:
+    def _draw_leakage(self, rng: np.random.Generator) -> Complex[np.ndarray, "tx rx"]:
         leakage = self.settings.leakage
-        phase = rng.uniform(0, 2 * np.pi, (3, 4))
+        phase = rng.uniform(0, 2 * np.pi, self._shape)
         if leakage is None:
-            return np.zeros((3, 4), complex)
-        return leakage.measured if leakage.channels else 10 ** (leakage.level_db / 20) * np.exp(1j * phase)
+            return np.zeros(self._shape, complex)
+        measured = leakage.channels is not None
+        return leakage.measured(self._board) if measured else 10 ** (leakage.level_db / 20) * np.exp(1j * phase)
 
-    def _draw_mount(self, echo: MountEcho, rng: np.random.Generator) -> Complex[np.ndarray, "3 4"]:
-        normal = rng.standard_normal((3, 4, 2)).view(complex)[..., 0] * np.sqrt(0.5)
-        return echo.measured if echo.channels else 10 ** (echo.level_db / 20) * normal
+    def _draw_mount(self, echo: MountEcho, rng: np.random.Generator) -> Complex[np.ndarray, "tx rx"]:
+        normal = rng.standard_normal((*self._shape, 2)).view(complex)[..., 0] * np.sqrt(0.5)
+        return echo.measured(self._board) if echo.channels else 10 ** (echo.level_db / 20) * normal
 
     # --- levels ------------------------------------------------------------------------------------------------------
     @property

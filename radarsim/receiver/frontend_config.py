@@ -46,16 +46,20 @@ class Channel(_Strict):
 class _PerChannel(_Strict):
     channels: tuple[Channel, ...] | None = None
 
-    @model_validator(mode="after")
-    def _twelve(self):
-        if self.channels is not None and len(self.channels) != 12:
-            raise ValueError(f"channels has {len(self.channels)} entries, expected 12: TX1 x RX1..4, then TX2, TX3")
-        return self
+    def measured(self, board: Board) -> Complex[np.ndarray, "tx rx"]:
+        """`channels` as complex amplitudes.
 
-    @property
-    def measured(self) -> Complex[np.ndarray, "3 4"]:
-        """`channels` as complex amplitudes."""
-        return np.array([c.factor for c in self.channels or ()]).reshape(3, 4)
+        Raises:
+            InputError: they are not as many as the board's.
+        """
+        tx, rx = len(board.tx), len(board.rx)
+        channels = self.channels or ()
+        if len(channels) != tx * rx:
+            raise InputError(
+                f"front end: channels has {len(channels)} entries, expected {tx * rx} on the {board}: TX1 x RX1..{rx}, "
+                "then TX2, ..."
+            )
+        return np.array([c.factor for c in channels]).reshape(tx, rx)
 
 
 class Mismatch(_PerChannel):

@@ -157,7 +157,7 @@ class Interference:
         length = _lengths(config, other, motion, ends) / SPEED_OF_LIGHT  # chirp, begin and end, their tx, rx
         number, ramp = _chirps(theirs, rate * (own - other.start), rate * config.ramp_end_time)
         slot = number % (theirs.loops * len(theirs.tx_order)) % len(theirs.tx_order)
-        sender = np.array([theirs.tx.index(k) for k in theirs.tx_order])[slot]
+        sender = np.array(theirs.turn)[slot]
         late, later = (np.take_along_axis(length[:, k], sender[..., None], axis=1) for k in (0, 1))
         # Their clock within their ramp is l = begun + pace t.
         pace = rate * (1 - (later - late) / config.ramp_end_time)
@@ -184,13 +184,19 @@ def _chirps(
     Returns:
         both (chirp, candidate); s.
     """
-    count = theirs.loops * len(theirs.tx_order)
+    chirps = len(theirs.tx_order)
+    count = theirs.loops * chirps
     frame = np.floor(time / theirs.frame_period).astype(int)
-    within = np.floor((time - frame * theirs.frame_period) / theirs.chirp_time).astype(int)
+    since = time - frame * theirs.frame_period
+    within = np.floor(since / theirs.chirp_time).astype(int)
+    if theirs.loop_idle_time:
+        loop = np.floor(since / theirs.loop_time).astype(int)
+        slot = np.floor((since - loop * theirs.loop_time) / theirs.chirp_time).astype(int)
+        within = loop * chirps + np.minimum(slot, chirps - 1)
     first = frame * count + np.clip(within, 0, count - 1)
     number = first[:, None] - 1 + np.arange(3 + int(duration / theirs.chirp_time))
     start = number // count * theirs.frame_period + number % count * theirs.chirp_time
-    return number, start + theirs.idle_time
+    return number, start + theirs.idle_time + number % count // chirps * theirs.loop_idle_time
 
 
 def _lengths(

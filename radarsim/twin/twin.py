@@ -191,6 +191,6 @@ def _calibrated(config: RadarConfig) -> FrontEndConfig:
     """The default board; where the recording has a channel calibration, a board of which that is the right one."""
     if config.channel_calibration is None:
         return FrontEndConfig.of(config.board)
-    # The simulated board turns the receivers' signs by itself.
-    channels = load_board(config.board).rx_sign / config.channel_factors
+    # The simulated board turns the antennas' signs by itself.
+    channels = load_board(config.board).signs / config.channel_factors
     return FrontEndConfig.of(config.board, mismatch=Mismatch(channels=tuple(map(Channel.of, channels.ravel()))))

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from radarize.io.errors import InputError
 from radarize.radar.boards import BOARDS
+from radarize.radar.boards.chips import CHIPS
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 from radarize.radar.presets import PRESETS, load_config
@@ -67,12 +68,13 @@ def configs(draw) -> RadarConfig:
     adc_start, samples, rate = draw(st.floats(0, 20e-6)), draw(st.integers(1, 1024)), draw(st.floats(2e6, 12.5e6))
     ramp = adc_start + samples / rate + draw(positive)
     idle, loops = draw(positive), draw(st.integers(1, 255))
-    order = draw(st.permutations((0, 1, 2)))[: draw(st.integers(1, 3))]
-    board = draw(st.sampled_from(sorted(BOARDS)))
-    unit = st.floats(-2, 2)
+    pause = draw(st.sampled_from((0.0, 135e-6)))
+    board = BOARDS[draw(st.sampled_from(sorted(BOARDS)))]
+    tx, rx, unit = len(board.tx), len(board.rx), st.floats(-2, 2)
+    order = draw(st.permutations(range(tx)))[: draw(st.integers(1, tx))]
     return RadarConfig(
-        board=board,
-        start_frequency=draw(st.floats(76e9, 81e9) if board == "iwr1843boost" else st.floats(60e9, 64e9)),
+        board=board.name,
+        start_frequency=draw(st.floats(*CHIPS[board.chip].bands[0])),
         slope=draw(st.floats(1e12, 250e12)),
         idle_time=idle,
         adc_start_time=adc_start,
@@ -80,15 +82,16 @@ def configs(draw) -> RadarConfig:
         samples=samples,
         sample_rate=rate,
         loops=loops,
-        frame_period=(idle + ramp) * loops * len(order) * draw(st.floats(1, 3)),
+        frame_period=((idle + ramp) * len(order) + pause) * loops * draw(st.floats(1, 3)),
+        loop_idle_time=pause,
         tx_order=order,
-        rx=tuple(sorted(draw(st.sets(st.integers(0, 3), min_size=1)))),
+        rx=tuple(sorted(draw(st.sets(st.integers(0, rx - 1), min_size=1)))),
         rx_gain_db=draw(st.integers(0, 63)),
         tx_backoff_db=draw(st.integers(0, 30)),
         high_pass=(draw(st.sampled_from(HIGH_PASS_1)), draw(st.sampled_from(HIGH_PASS_2))),
-        iq_order=draw(st.sampled_from(("iiqq", "qqii"))),
+        iq_order=draw(st.sampled_from(("iiqq", "qqii", "real"))),
         range_bias=draw(st.floats(-1, 1)),
-        channel_calibration=tuple((draw(unit), draw(unit)) for _ in range(12)),
+        channel_calibration=tuple((draw(unit), draw(unit)) for _ in range(tx * rx)),
     )
 
 
@@ -131,12 +134,13 @@ def test_rf_gain_target_bits_are_not_gain():
 @pytest.mark.parametrize(
     "old, new, message",
     [
-        ("adcCfg 2 1", "adcCfg 2 0", "line 5: adcCfg adcOutputFmt is 0, expected 1"),
+        ("adcCfg 2 1", "adcCfg 2 3", "line 5: adcCfg adcOutputFmt is 3, expected 0 or 1"),
+        ("adcCfg 2 1", "adcCfg 2 0", "line 6: adcbufCfg adcOutputFmt is 0, expected 1 (real samples"),
         ("adcCfg 2 1", "adcCfg 1 1", "numADCBits is 1"),
         ("adcbufCfg -1 0 1 1 1", "adcbufCfg -1 1 1 1 1", "adcbufCfg adcOutputFmt is 1, expected 0"),
         ("adcbufCfg -1 0 1 1 1", "adcbufCfg -1 0 1 0 1", "ChanInterleave is 0"),
-        ("0 0 0 0 0 4", "0 0 0 0 0 5", "line 9: chirpCfg txEnable is 5, expected 1, 2 or 4"),
-        ("0 0 0 0 0 4", "0 0 0 0 0 1", "expected each transmitter once"),
+        ("0 0 0 0 0 4", "0 0 0 0 0 0", "line 9: chirpCfg txEnable is 0, expected a transmitter at least"),
+        ("0 0 0 0 0 4", "0 0 0 0 0 9", "line 9: chirpCfg txEnable is 9, expected transmitters that channelCfg"),
         ("channelCfg 15 7 0", "channelCfg 15 5 0", "chirpCfg txEnable is 2"),
         ("channelCfg 15 7 0", "channelCfg 0 7 0", "rxChannelEn is 0"),
         ("channelCfg 15 7 0", "channelCfg 15 7", "line 4: channelCfg has 2 values, expected 3"),
@@ -154,8 +158,9 @@ def test_rf_gain_target_bits_are_not_gain():
         ("7 50 0 0", "7 50 0 4", "txPhaseShifter is 4"),
         ("7 50 0 0", "7 50 1 0", "txOutPower is 1, expected the same"),
         ("lvdsStreamCfg -1 0 1 0", "lvdsStreamCfg -1 1 1 0", "enableHeader is 1"),
-        ("lvdsStreamCfg -1 0 1 0", "bpmCfg -1 1 0 1", "bpmCfg isEnabled is 1"),
+        ("lvdsStreamCfg -1 0 1 0", "bpmCfg -1 1 0 1", "bpmCfg isEnabled is 1, expected 0, or two chirps"),
         ("lvdsStreamCfg -1 0 1 0", "advFrameCfg 2 0 0 1 0", "advanced frames"),
+        ("frameCfg 0 2 32 0 33.333 1 0", "frameCfg 2 0 403 64 250 0", "has the 6 values of a low-power chip"),
         ("lvdsStreamCfg -1 0 1 0", "frameCgf 0 2 32 0 33 1 0", "unknown command frameCgf, expected frameCfg"),
         ("lvdsStreamCfg -1 0 1 0", "{}", "line 12: starts with '{}'"),
         ("profileCfg 0 77", "% profileCfg 0 77", "has no profileCfg line"),

@@ -50,9 +50,9 @@ def _at(settings: dict, path: str) -> tuple[dict, str]:
     "path, value, message",
     [
         ("rfConfig/waveformType", "advancedFrameChirp", "waveformType is advancedFrameChirp"),
-        ("rfConfig/rlAdcOutCfg_t/fmt/b2AdcOutFmt", 0, "b2AdcOutFmt is 0, expected 1"),
+        ("rfConfig/rlAdcOutCfg_t/fmt/b2AdcOutFmt", 2, "b2AdcOutFmt is 2, expected 0 or 1"),
         ("rfConfig/rlChanCfg_t/rxChannelEn", "0x0", "rx"),
-        ("rfConfig/rlChirps/1/rlChirpCfg_t/txEnable", "0x3", "txEnable is 3"),
+        ("rfConfig/rlChirps/1/rlChirpCfg_t/txEnable", "0x0", "txEnable is 0, expected a transmitter"),
         ("rfConfig/rlChirps/1/rlChirpCfg_t/idleTimeVar_usec", 0.5, "idleTimeVar_usec is 0.5"),
         ("rfConfig/rlChirps/1/rlChirpCfg_t/profileId", 1, "one defined profile"),
         ("rfConfig/rlFrameCfg_t/chirpEndIdx", 3, "chirp 3 has none"),

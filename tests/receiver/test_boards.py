@@ -12,6 +12,7 @@ from radarize.io.importers.parameters import Given
 from radarize.io.recording import Recording
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.boards import BOARDS, load_board
+from radarize.radar.boards.chips import CHIPS
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
@@ -53,9 +54,12 @@ front_end:
 
 
 def radar(board: str | Path) -> RadarConfig:
-    """The preset's chirps on a board, as a data set's variant makes them of it."""
-    start = 77e9 if load_board(board).chip == "iwr1843" else 60e9
-    return Variant(radar={"board": board, "start_frequency": start}).radar_of("radarize")
+    """The preset's chirps on a board with all its antennas, as a data set's variant makes them of it."""
+    found = load_board(board)
+    start = 77e9 if CHIPS[found.chip].bands[0][0] > 70e9 else 60e9
+    tx, rx = (tuple(range(len(antennas))) for antennas in (found.tx, found.rx))
+    fields = {"board": board, "start_frequency": start, "tx_order": PRESET.tx_order if len(tx) == 3 else tx, "rx": rx}
+    return Variant(radar=fields).radar_of("radarize")
 
 
 def sphere(azimuth: float, elevation: float) -> Scene:
@@ -244,7 +248,8 @@ def test_a_front_end_file_changes_fields_of_the_boards(tmp_path):
     [
         ("chip: iwr6843\n", "", "has no chip"),
         ("chip: iwr6843", "chip: iwr9", "chip is 'iwr9'"),
-        ("tx: [[0, 0], [1, 0], [2, 0]]", "tx: [[0, 0]]", "has no tx.1"),
+        ("tx: [[0, 0], [1, 0], [2, 0]]", "tx: []", "tx is []"),
+        ("rx_sign: [-1, 1, -1, 1]", "rx_sign: [-1, 1]", "rx_sign has 2 entries, expected one for each of 4"),
         ("rx_sign: [-1, 1", "rx_sign: [-2, 1", "rx_sign.0 is -2"),
         ("chip:", "chips: iwr6843\nchip:", "chips"),
         (OWN, "[1, 2]", "holds a list"),
@@ -266,9 +271,11 @@ def test_bad_front_ends_are_refused_when_simulated(own, tmp_path):
 
 
 def test_unknown_boards_and_files_in_recordings(own):
-    with pytest.raises(InputError, match="radar: board is 'iwr1', expected one of iwr1843boost, .*or the path"):
+    with pytest.raises(
+        InputError, match="radar: board is 'iwr1', expected one of awr1642boost, .*, iwr1843boost, .*or the path"
+    ):
         PRESET.changed("radar", board="iwr1")
     with pytest.raises(InputError, match=r"nowhere.yaml: no such file"):
         PRESET.changed("radar", board="nowhere.yaml")
-    with pytest.raises(ValueError, match="expected one of iwr1843boost"):  # whose file would be read?
+    with pytest.raises(ValueError, match="expected one of awr1642boost, .*iwr1843boost"):  # whose file would be read?
         RadarConfig.model_validate_json(PRESET.model_dump_json().replace("iwr1843boost", str(own)))

@@ -56,7 +56,7 @@ class PublishedMaps(Maker):
     history = max(*BUFFERS, BURSTS) - 1
 
     def __init__(self, config: RadarConfig):
-        if len(config.tx) * len(config.rx) != 12:
+        if len(set(config.tx)) * len(config.rx) != 12:
             raise InputError(f"tx {config.tx} and rx {config.rx} are no 12 channels, which the published method needs")
         self.config = config
         # The vector lists TX1, TX2, TX3; the artefact multiplies the first, second, third chirp with it.
@@ -100,8 +100,7 @@ class PublishedMaps(Maker):
         self, adc: Int16[np.ndarray, "frame loop tx rx sample 2"]
     ) -> Complex64[torch.Tensor, "frame loop 12 sample"]:
         """Calibrated samples of virtual channels in firing order: 0-3 are TX1's, 4-7 TX3's, 8-11 TX2's."""
-        fired = [self.config.tx.index(tx) for tx in self.config.tx_order]
-        samples = torch.view_as_complex(torch.as_tensor(adc).float())[:, :, fired]
+        samples = torch.view_as_complex(torch.as_tensor(adc).float())[:, :, list(self.config.turn)]
         return samples.flatten(2, 3) * self._calibration
 
     def _doppler_azimuth(self, slow: Complex64[torch.Tensor, "chirp 12 sample"]) -> tuple[torch.Tensor, torch.Tensor]:

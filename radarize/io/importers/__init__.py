@@ -18,6 +18,8 @@ from radarize.io.importers.format import FORMATS, Format
 from radarize.io.importers.parameters import Given
 from radarize.io.recording import Product, RecordingWriter
 from radarize.io.tum import read_tum
+from radarize.radar.array import losses
+from radarize.radar.cfg import assumed_board, remarks
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import range_balance
 
@@ -75,6 +77,7 @@ def import_recording(
             "one chirp a loop is assumed, of TX1: of a capture with two transmitters, all speeds would be doubled; "
             "--tx says how many there are"
         )
+    capture.warnings += _of_the_radar(capture, given)
     radar, swapped = _settle_iq_order(capture, first, "iq_order" in given.overrides)
     streams = {name: each for name, each in capture.streams.items() if not products or not name.startswith(_POSES)}
     writer = RecordingWriter(
@@ -102,6 +105,14 @@ def import_recording(
         capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
+
+
+def _of_the_radar(capture: Capture, given: Given) -> list[str]:
+    """The board that is assumed where neither capture nor user names one, and what the firing order costs."""
+    if given.overrides.get("board") is not None:
+        return losses(capture.config)
+    unsaid = not capture.cfg_text and given.config is None and not capture.board_known
+    return [*([assumed_board(capture.config)] if unsaid else []), *remarks(capture.cfg_text, capture.config)]
 
 
 def _poses(path: Path) -> dict[str, Product]:
@@ -151,7 +162,7 @@ def _settle_iq_order(capture: Capture, batch: CapturedFrames, given: bool) -> tu
     config = capture.config
     decibels = range_balance(batch.frames[:_ASKED])
     other = "iiqq" if config.iq_order == "qqii" else "qqii"
-    if given or abs(decibels) < _CERTAIN_DB:
+    if given or config.iq_order == "real" or abs(decibels) < _CERTAIN_DB:
         return config, False
     if "iq_order" in capture.assumed:
         found = config.iq_order if decibels > 0 else other

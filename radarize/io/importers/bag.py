@@ -18,6 +18,7 @@ from radarize.io.importers.format import Format
 from radarize.io.importers.frames import BagFrames, Stamps
 from radarize.io.importers.parameters import Given
 from radarize.io.importers.rosbag import Bag, Message, is_frame
+from radarize.radar.cfg import numbers
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
 from radarize.radar.presets import PRESETS
@@ -35,6 +36,8 @@ COMPANIONS: tuple[tuple[str, tuple[str, ...], type[Companion]], ...] = (
     ),
 )
 _RADAR = "/radar0/radar_data"
+#: Of frames whose shape is that of the Radarize data set, which was made with this board.
+OF_RADARIZE = "configuration: preset radarize"
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 #: s: so much of the other topics is read ahead of the frames; messages are received that late at most.
 _AHEAD = 0.5
@@ -71,6 +74,7 @@ def open_bag(path: Path, given: Given) -> Capture:
     check_layout(config)
     stamps = Stamps(config, first, received, given.latency)
     capture = Capture(config, given.cfg_text, (), len(received), (*assumed, *stamps.assumed, *unknown), warnings)
+    capture.board_known = OF_RADARIZE in assumed
     capture.attributes["stamps"] = str(stamps)
     capture.streams = {name: stream for companion in taken for name, stream in companion.streams.items()}
     capture.products = {name: product for companion in taken for name, product in companion.products.items()}
@@ -126,7 +130,7 @@ def _configure(path: Path, frame: Message, given: Given) -> tuple[RadarConfig, t
     said = {"samples": shape[-1], "loops": loops, "rx": rx, "tx": tx}
     preset = PRESETS["radarize"]
     if given.config is None and said == {name: getattr(preset, name) for name in said}:
-        return given.or_else(preset, "").configure(str(path))[0], ("configuration: preset radarize", "iq_order")
+        return given.or_else(preset, "").configure(str(path))[0], (OF_RADARIZE, "iq_order")
     return given.configure(str(path), said)
 
 
@@ -134,7 +138,7 @@ def _antennas(field: int | np.ndarray) -> tuple[int, ...]:
     """Antennas in use, 0-based, from a bit mask or from one truth value an antenna."""
     values = [int(value) for value in np.atleast_1d(field)]
     if len(values) == 1 and values[0] > 1:
-        return tuple(k for k in range(4) if values[0] >> k & 1)
+        return numbers(values[0])
     return tuple(k for k, value in enumerate(values) if value)
 
 
@@ -146,10 +150,13 @@ def _calibrated(config: RadarConfig, frame: Message, name: str, warnings: list[s
     untouched = config.range_bias == 0 and config.channel_calibration is None
     if not untouched or not pairs.any():
         return config
-    if pairs.size != 24 or not np.isfinite([*pairs, bias]).all():
-        warnings.append(f"rx_phase_bias has {pairs.size} numbers, expected 12 pairs; no calibration is taken from it")
+    channels = config.channel_factors.size
+    if pairs.size != 2 * channels or not np.isfinite([*pairs, bias]).all():
+        warnings.append(
+            f"rx_phase_bias has {pairs.size} numbers, expected {channels} pairs; no calibration is taken from it"
+        )
         return config
-    factors = tuple((float(re), float(im)) for re, im in pairs.reshape(12, 2))
+    factors = tuple((float(re), float(im)) for re, im in pairs.reshape(channels, 2))
     return config.changed(name, range_bias=bias, channel_calibration=factors)
 
 

@@ -48,6 +48,7 @@ class Capture:
         assumed: settings that nobody gave.
         warnings: what the user should know; complete once `batches` is exhausted.
         attributes: facts to store with the recording.
+        board_known: it says which board made it.
         streams, products: what came along with the samples, as `RecordingWriter` takes them.
     """
 
@@ -58,5 +59,6 @@ class Capture:
     assumed: tuple[str, ...] = ()
     warnings: list[str] = field(default_factory=list)
     attributes: dict[str, object] = field(default_factory=dict)
+    board_known: bool = False
     streams: Mapping[str, Stream] = field(default_factory=dict)
     products: Mapping[str, Product] = field(default_factory=dict)

@@ -29,11 +29,12 @@ def recorded(config: RadarConfig, layout: str) -> RadarConfig:
     Raises:
         InputError: real samples that are no multiple of four.
     """
-    if layout != "real":
+    if layout != "real" or config.iq_order == "real":  # which counts the complex ones already
         return config
     if config.samples % 4:
         raise InputError(f"samples is {config.samples}, expected a multiple of four real samples")
-    return config.model_copy(update={"samples": config.samples // 2, "sample_rate": config.sample_rate / 2})
+    halved = {"samples": config.samples // 2, "sample_rate": config.sample_rate / 2, "iq_order": "real"}
+    return config.model_copy(update=halved)
 
 
 def arranged(words: Words, config: RadarConfig, layout: str) -> Frames:
@@ -43,14 +44,11 @@ def arranged(words: Words, config: RadarConfig, layout: str) -> Frames:
         words: of whole frames.
         config: `recorded`.
     """
-    if layout == "pairs":
+    if layout != "interleaved":
         return decode(words, config)
     loops, tx, rx, samples, _ = config.frame_shape
-    if layout == "interleaved":
-        chirps = words.reshape(-1, loops, tx, samples, 2, rx).transpose(0, 1, 2, 5, 3, 4)
-        chirps = chirps[..., ::-1] if config.iq_order == "qqii" else chirps
-    else:
-        chirps = _analytic(words.reshape(-1, loops, tx, rx, 2 * samples))
+    chirps = words.reshape(-1, loops, tx, samples, 2, rx).transpose(0, 1, 2, 5, 3, 4)
+    chirps = chirps[..., ::-1] if config.iq_order == "qqii" else chirps
     return np.ascontiguousarray(chirps[:, :, list(config.slot)])
 
 
@@ -71,19 +69,10 @@ def likely(words: Words, config: RadarConfig, layout: str) -> str:
 
 def _nearer(words: Words, config: RadarConfig, layout: str) -> float:
     """dB of energy at near range over that far away, whichever of I and Q is first; 0 where too few words are there."""
-    if layout == "real" and config.samples % 4:
+    if layout == "real" and config.iq_order != "real" and config.samples % 4:
         return 0.0
-    of_one = recorded(config, layout).model_copy(update={"loops": 1, "tx_order": (0,)})
+    of_one = recorded(config, layout).model_copy(update={"loops": 1, "tx_order": (0,), "bpm": None})
     count = min(len(words) // (of_one.frame_bytes // 2), _ASKED)
     if not count:
         return 0.0
     return abs(range_balance(arranged(words[: count * (of_one.frame_bytes // 2)], of_one, layout)))
-
-
-def _analytic(real: Int16[np.ndarray, "... sample"]) -> Int16[np.ndarray, "... half 2"]:
-    """Complex samples of the same beats: the upper half of their spectrum mirrors the lower one, and is dropped."""
-    spectrum = np.fft.rfft(real.astype(np.float32), axis=-1)[..., :-1]
-    spectrum[..., 0] /= 2
-    signal = np.fft.ifft(spectrum, axis=-1)
-    limits = np.iinfo(np.int16)
-    return np.stack([signal.real, signal.imag], axis=-1).round().clip(limits.min, limits.max).astype(np.int16)

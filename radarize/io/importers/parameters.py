@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from radarize.io.errors import InputError
+from radarize.radar.boards import likely_board, load_board
 from radarize.radar.config import RadarConfig
 
 #: Without these nobody can tell the frames apart.
@@ -80,7 +81,9 @@ class Given:
         given: dict[str, Any] = {key: value for key, value in self.overrides.items() if value is not None}
         if self.config is None:
             given = {**(found or {}), **given}
-        for key, most in (("rx", 4), ("tx", 3)):
+        frequency = given.get("start_frequency", ASSUMED["start_frequency"])
+        board = load_board(given.get("board") or (self.config.board if self.config else likely_board(frequency)))
+        for key, most in (("rx", len(board.rx)), ("tx", len(board.tx))):
             if isinstance(count := given.get(key), int) and not 1 <= count <= most:
                 raise InputError(f"{name}: {key} is {count}, expected 1 to {most} antennas")
         if isinstance(rx := given.get("rx"), int):

@@ -8,6 +8,8 @@ from radarize.io.importers.bin import of_studio, open_bin, parts
 from radarize.io.importers.capture import Capture
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
+from radarize.radar.boards import named_board
+from radarize.radar.cfg import assumed_board
 from radarize.radar.studio import load_json, load_studio
 
 
@@ -33,6 +35,9 @@ def open_studio(source: Path, given: Given) -> Capture:
         captures = {parts(path) for path in folder.glob("*.bin")}
         files = captures.pop() if len(captures) == 1 else [_one(folder, "*.bin")]
     warnings = (f"{filled} bytes were lost on capture and filled with zeros",) if filled else ()
+    known = named_board(str(setup.get("mmWaveDevice", ""))) is not None or given.overrides.get("board") is not None
+    if not known:
+        warnings = (*warnings, assumed_board(config))
     return open_bin(files, config, given.cfg_text, warnings=warnings, encoding=given.encoding, layout=given.layout)
 
 

@@ -1,20 +1,25 @@
 """Boards: the antenna layout, the chip and the front end of each, in a YAML file of the board's name.
 
 The files in this folder are `BOARDS`; a file elsewhere is given by its path wherever a board is named. The head of
-`iwr1843boost.yaml` says what such a file holds. Antennas are numbered as on the board: TX1 to TX3, RX1 to RX4.
+`iwr1843boost.yaml` says what such a file holds. Antennas are numbered as on the board, TX1 and RX1 first; a board has
+as many as its file lists.
 """
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator
+import numpy as np
+from jaxtyping import Int
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from radarize.io.errors import InputError
 from radarize.io.plain import Frozen, complaint
 from radarize.io.yamlfile import read_yaml
+from radarize.radar.boards.chips import CHIPS
 
 _FOLDER = Path(__file__).parent
 SUFFIXES = (".yaml", ".yml")
@@ -23,27 +28,50 @@ Place = tuple[Coordinate, Coordinate]
 Sign = Literal[-1, 1]
 
 
+def _in_phase(antennas: tuple[Place, ...]) -> tuple[Sign, ...]:
+    one: Sign = 1
+    return tuple(one for _ in antennas)
+
+
 class Board(Frozen):
     """A board.
 
     Attributes:
         name: of its file, without the suffix.
         source: the document that describes the layout.
-        chip: whose bands and limits apply.
+        chip: a name of `radarize.radar.boards.chips.CHIPS`, whose bands and limits apply.
         design_frequency: of the antenna spacings, Hz.
         tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
-        rx_sign: -1 for receivers fed from the opposite side of the patch, whose signal is turned by 180 deg.
+        tx_sign, rx_sign: -1 for antennas fed from the opposite side of the patch, whose signal is turned by 180 deg.
+            Default: none are.
+        platforms: other names by which configurations call this very board (``% Platform:``, ``mmWaveDevice``).
         front_end: fields of `radarsim.receiver.frontend_config.FrontEndConfig`, which only the simulator reads.
     """
 
     name: str
     source: str
-    chip: Literal["iwr1843", "iwr6843"]
+    chip: str
     design_frequency: float = Field(ge=1e9, le=1e12)
-    tx: tuple[Place, Place, Place]
-    rx: tuple[Place, Place, Place, Place]
-    rx_sign: tuple[Sign, Sign, Sign, Sign] = (1, 1, 1, 1)
+    tx: tuple[Place, ...] = Field(min_length=1, max_length=16)
+    rx: tuple[Place, ...] = Field(min_length=1, max_length=16)
+    tx_sign: tuple[Sign, ...] = Field(default_factory=lambda fields: _in_phase(fields.get("tx", ())))
+    rx_sign: tuple[Sign, ...] = Field(default_factory=lambda fields: _in_phase(fields.get("rx", ())))
+    platforms: tuple[str, ...] = ()
     front_end: dict[str, Any]
+
+    @field_validator("chip")
+    @classmethod
+    def _known(cls, chip: str) -> str:
+        if chip not in CHIPS:
+            raise ValueError(f"one of {', '.join(CHIPS)}")
+        return chip
+
+    @model_validator(mode="after")
+    def _as_many_signs(self) -> "Board":
+        for name, antennas in (("tx_sign", self.tx), ("rx_sign", self.rx)):
+            if len(signs := getattr(self, name)) != len(antennas):
+                raise ValueError(f"{name} has {len(signs)} entries, expected one for each of {len(antennas)} antennas")
+        return self
 
     @field_validator("front_end", mode="before")
     @classmethod
@@ -55,15 +83,20 @@ class Board(Frozen):
             raise ValueError("names and numbers as keys") from error
 
     @property
+    def signs(self) -> Int[np.ndarray, "tx rx"]:
+        """Sign of each channel."""
+        return np.outer(self.tx_sign, self.rx_sign)
+
+    @property
     def nominal_calibration(self) -> tuple[tuple[float, float], ...]:
-        """Factor per physical (tx, rx) as (re, im) pairs that takes the receivers' signs off again."""
-        return tuple((float(sign), 0.0) for sign in self.rx_sign) * 3
+        """Factor per physical (tx, rx) as (re, im) pairs that takes the channels' signs off again."""
+        return tuple((float(sign), 0.0) for sign in self.signs.ravel())
 
     def __str__(self) -> str:
         return self.name
 
     def __hash__(self) -> int:
-        return hash((self.name, self.design_frequency, self.tx, self.rx, self.rx_sign))
+        return hash((self.name, self.design_frequency, self.tx, self.rx, self.tx_sign, self.rx_sign))
 
 
 class _Files(Mapping[str, Board]):
@@ -120,10 +153,18 @@ def expected() -> str:
     return f"one of {', '.join(BOARDS)}, or the path of a board's .yaml file"
 
 
-def board_of(device: str, start_frequency: float) -> str:
-    """The evaluation board of a device name and band (Hz); plain iwr6843 is taken for the ISK, the commonest of its
-    three boards."""
-    if start_frequency > 70e9:
-        return "iwr1843boost"
-    name = device.lower()
-    return "iwr6843aop" if "aop" in name else "iwr6843ods" if "ods" in name else "iwr6843isk"
+def named_board(device: str) -> str | None:
+    """The board that a device's or platform's name means (``xWR18xx``, ``IWR6843AOP``); None where it means none, or
+    one of several: a plain ``iwr6843`` may be on the ISK, the ODS or the AOP."""
+    word = _plain(device)
+    found = (name for name, board in BOARDS.items() if word in map(_plain, (name, *board.platforms)))
+    return next(found, None)
+
+
+def likely_board(start_frequency: float) -> str:
+    """The commonest evaluation board of a band (Hz), where nothing names one."""
+    return "iwr1843boost" if start_frequency > 70e9 else "iwr6843isk"
+
+
+def _plain(name: str) -> str:
+    return re.sub("[^a-z0-9]", "", name.lower())

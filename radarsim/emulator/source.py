@@ -82,5 +82,8 @@ def packed(frame: Int16[np.ndarray, "1 loop tx rx sample 2"], config: RadarConfi
     return encode(frame, config).astype("<i2", copy=False).tobytes()
 
 
-def _alike(first: float | tuple, second: float | tuple) -> bool:
-    return np.shape(first) == np.shape(second) and np.allclose(first, second, rtol=1e-9, atol=0)
+def _alike(first: object, second: object) -> bool:
+    one, other = (value if isinstance(value, tuple) else (value,) for value in (first, second))
+    if not all(isinstance(number, float) for number in one + other):
+        return first == second
+    return len(one) == len(other) and np.allclose(np.array(one), np.array(other), rtol=1e-9, atol=0)

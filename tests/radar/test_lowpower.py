@@ -86,7 +86,9 @@ def test_values_of_the_square():
 
 
 def test_one_transmitter_or_receiver_less():
-    config = parse_cfg(SQUARE.replace("153 255", "17 207").replace("frameCfg 64", "frameCfg 48"))  # RX1 and RX3; TX3 off
+    config = parse_cfg(
+        SQUARE.replace("153 255", "17 207").replace("frameCfg 64", "frameCfg 48")
+    )  # RX1 and RX3; TX3 off
     assert config.rx == (0, 2) and config.tx_order == (0, 1, 3)
 
 

@@ -8,6 +8,7 @@ from radarize.radar.presets import PRESETS
 from radarize.signal.aliasing import Aliases
 from radarize.signal.heatmaps import Heatmaps
 from tests.echoes import record
+from tests.radars import radar
 
 CONFIG = PRESETS["radarize"]
 SPAN = 2 * CONFIG.max_velocity
@@ -48,7 +49,7 @@ def test_noise_and_a_single_transmitter_tell_nothing():
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_of_any_board(board):
-    config = CONFIG.model_copy(update={"board": board})
+    config = radar(board)
     adc, _ = frame((0.5, 0.2), config)
     assert not Aliases(config).of(Heatmaps(config).spectrum(adc)).any()
 

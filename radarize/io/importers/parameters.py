@@ -12,12 +12,13 @@ from radarize.radar.config import RadarConfig
 #: Without these nobody can tell the frames apart.
 REQUIRED = ("samples", "loops", "rx")
 
+_START_FREQUENCY = 77e9
 #: Stand-ins where neither a configuration nor the user says otherwise: a common IWR1843 profile. They do not change
 #: the samples, only the scales of range, velocity and time.
 ASSUMED: dict[str, object] = {
     "tx_order": (0,),
     "iq_order": "qqii",  # unless the samples say otherwise
-    "start_frequency": 77e9,
+    "start_frequency": _START_FREQUENCY,
     "slope": 60e12,
     "sample_rate": 5e6,
     "idle_time": 10e-6,
@@ -81,8 +82,9 @@ class Given:
         given: dict[str, Any] = {key: value for key, value in self.overrides.items() if value is not None}
         if self.config is None:
             given = {**(found or {}), **given}
-        frequency = given.get("start_frequency", ASSUMED["start_frequency"])
-        board = load_board(given.get("board") or (self.config.board if self.config else likely_board(frequency)))
+        frequency = given.get("start_frequency")
+        likely = likely_board(frequency if isinstance(frequency, float) else _START_FREQUENCY)
+        board = load_board(given.get("board") or (self.config.board if self.config else likely))
         for key, most in (("rx", len(board.rx)), ("tx", len(board.tx))):
             if isinstance(count := given.get(key), int) and not 1 <= count <= most:
                 raise InputError(f"{name}: {key} is {count}, expected 1 to {most} antennas")
@@ -98,7 +100,7 @@ class Given:
                 f"{name}: has no radar configuration, expected a .cfg or .mmwave.json file, or at least values for "
                 f"{', '.join(REQUIRED)} (missing: {', '.join(missing)})"
             )
-        fields: dict[str, Any] = {**ASSUMED, **given}
+        fields: dict[str, Any] = {"board": board.name, **ASSUMED, **given}
         try:
             adc_end = fields["adc_start_time"] + fields["samples"] / fields["sample_rate"]
             fields.setdefault("ramp_end_time", adc_end + _AFTER_ADC)
@@ -106,4 +108,4 @@ class Given:
             fields.setdefault("frame_period", max(_FRAME_PERIOD, 1.5 * burst))
         except (TypeError, ZeroDivisionError, OverflowError):
             pass  # the configuration's own checks name the field
-        return RadarConfig.build(name, **fields), tuple(key for key in fields if key not in given)
+        return RadarConfig.build(name, **fields), tuple(key for key in fields if key not in given and key != "board")

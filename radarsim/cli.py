@@ -59,11 +59,14 @@ def simulate(
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     plan: Any = {name: value for name, value in locals().items() if name not in ("scene", "output")}
     from radarize.io.recording import keeping
+    from radarize.radar.cfg import remarks
     from radarsim.api import simulate
     from radarsim.motion.statistics import Statistics
 
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
         recording = simulate(scene, output, progress=report, **plan)
+    for words in remarks(recording.cfg_text, recording.config):
+        print(f"warning: {words}")
     print(Statistics.from_json(str(recording.attributes["motion"])))
     _print_warnings(recording.attributes)
     print(output)

@@ -46,8 +46,8 @@ class Channel(_Strict):
 class _PerChannel(_Strict):
     channels: tuple[Channel, ...] | None = None
 
-    def measured(self, board: Board) -> Complex[np.ndarray, "tx rx"]:
-        """`channels` as complex amplitudes.
+    def measured(self, board: Board, source: str = "front end") -> Complex[np.ndarray, "tx rx"]:
+        """`channels` as complex amplitudes; `source` is what errors name as their origin.
 
         Raises:
             InputError: they are not as many as the board's.
@@ -56,7 +56,7 @@ class _PerChannel(_Strict):
         channels = self.channels or ()
         if len(channels) != tx * rx:
             raise InputError(
-                f"front end: channels has {len(channels)} entries, expected {tx * rx} on the {board}: TX1 x RX1..{rx}, "
+                f"{source}: channels has {len(channels)} entries, expected {tx * rx} on the {board}: TX1 x RX1..{rx}, "
                 "then TX2, ..."
             )
         return np.array([c.factor for c in channels]).reshape(tx, rx)
@@ -243,7 +243,11 @@ class FrontEndConfig(_Strict):
         data = read_yaml(path)
         if not isinstance(data, dict | None):
             raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as tx_power_dbm and leakage")
-        return cls.build(str(path), changed(cls.of(board), data or {}))
+        found = cls.build(str(path), changed(cls.of(board), data or {}))
+        for part in (found.mismatch, found.leakage, *(found.mount or ())):
+            if part and part.channels is not None:
+                part.measured(load_board(board), str(path))
+        return found
 
     @classmethod
     def build(cls, source: str, fields: dict[str, object]) -> "FrontEndConfig":

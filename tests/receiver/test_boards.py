@@ -16,6 +16,7 @@ from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
 from radarize.signal.heatmaps import Heatmaps
+from radarize.signal.points import PointCloudConfig, PointClouds
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.variant import Variant
 from radarsim.emulator.simulation import Simulation
@@ -115,6 +116,34 @@ def test_elevation_aware_maps_show_what_is_level(board):
         assert 10 * np.log10(wrong.elevation_aware(samples)[0, row].max() / plain) < -25
 
 
+NEW = ("awr1642boost", "iwr1443boost", "awr1843aop", "awr2243boost", "awr2944evm", "iwrl6432boost", "awrl6844evm")
+
+
+@pytest.mark.parametrize("board", NEW)
+def test_points_of_two_seconds_lie_where_the_target_is(tmp_path, board):
+    """From a .cfg through a recording to the chip's point cloud: azimuth, and elevation where the array tells it."""
+    config = radar(board).changed("radar", frame_period=0.25, loops=16)
+    (tmp_path / "radar.cfg").write_text(write_cfg(config))
+    elevation = 8 if tells_elevation(config) else 0
+    simulate(
+        sphere(15, elevation), tmp_path / "a.h5", radar=str(tmp_path / "radar.cfg"), duration=2.0, seed=2,
+        trajectory=_still(tmp_path / "still.tum", 24),
+    )  # fmt: skip
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.config == config and len(recording) == 8
+        cloud, frame = PointClouds(recording.config, PointCloudConfig(min_range=1.0))(recording.adc(0, 8))
+    near = np.linalg.norm(cloud[:, :3], axis=1) < 3.5  # the last bins have what leakage at no range leaves there
+    cloud, frame = cloud[near], frame[near]
+    assert set(frame) == set(range(8))
+    x, y, z = np.array([cloud[frame == k][cloud[frame == k][:, 4].argmax(), :3] for k in range(8)]).T
+    assert np.sqrt(x**2 + y**2 + z**2) == pytest.approx(2.5, abs=0.05)
+    assert np.degrees(np.arcsin(y / np.sqrt(x**2 + y**2 + z**2))) == pytest.approx(
+        np.degrees(np.arcsin(np.sin(np.radians(15)) * np.cos(np.radians(elevation)))), abs=3
+    )
+    if elevation:
+        assert np.degrees(np.arctan2(z, np.hypot(x, y))) == pytest.approx(elevation, abs=3)
+
+
 def test_a_board_outside_the_package_in_a_recording(own, tmp_path):
     """From a .cfg that names the file beside it, by `simulate`; the recording needs the file no more."""
     config = radar(own)
@@ -131,8 +160,8 @@ def test_a_board_outside_the_package_in_a_recording(own, tmp_path):
         assert found(recording.config, recording.adc(0, 1))[1:] == pytest.approx((20, 12), abs=2)
 
 
-def _still(path: Path) -> Path:
-    path.write_text("".join(f"{0.1 * k} 0 0 0 0 0 0 1\n" for k in range(8)))
+def _still(path: Path, count: int = 8) -> Path:
+    path.write_text("".join(f"{0.1 * k} 0 0 0 0 0 0 1\n" for k in range(count)))
     return path
 
 

@@ -103,7 +103,7 @@ def main(options: argparse.Namespace) -> Page:
         data=data,
         notes=[
             f"{len(found['one process'])} recordings, {frames} frames. Efficiency: times as fast as one process, over "
-            "workers; start of processes included. One process has all cores for its threads, each of several its share.",
+            "workers; start of processes included. One process has all cores for its threads, several share them.",
             "Where a node is lost, its recording is begun again on another one, from the last frame that was written.",
             surroundings(),
         ],

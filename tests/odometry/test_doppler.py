@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from radarize.odometry.doppler import DopplerVelocity, _fit
+from radarize.radar.boards import BOARDS
 from radarize.radar.presets import PRESETS
 from radarize.signal.heatmaps import Heatmaps
 from tests.batches import batch
 from tests.echoes import record
+from tests.radars import radar
 from tests.rooms import antenna_gain, furnished_room
 
 CONFIG = PRESETS["radarize"]
@@ -176,6 +178,16 @@ def test_four_antennas_in_a_row(room, board):
     error = (found.velocity - truth)[..., None]
     nees = (error.mT @ np.linalg.solve(found.covariance, error)).mean() / 2
     assert found.seen.all() and np.sqrt((error**2).mean()) < 0.012 and nees < 2
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_any_board(room, board):
+    """However many antennas it has, in however many rows."""
+    config = radar(board)
+    found = DopplerVelocity(Heatmaps(config)).estimate(
+        batch(config, burst(room, (0.6, 0.15), config=config), np.zeros(1))
+    )
+    assert found.seen.all() and found.velocity[0] == pytest.approx((0.6, 0.15), abs=0.03)
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0), (0.3, 0.1), (0.94, 0.0), (1.0, 0.0)])

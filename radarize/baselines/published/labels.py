@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from radarize.io.recording import Recording
 
-#: Cells of scans: 4.51 cm where the radar's bins have 4.46 cm, and bearings (rad, ascending to the left) beside those of
-#: its maps.
+#: Cells of scans: 4.51 cm where the radar's bins have 4.46 cm, and bearings (rad, ascending to the left) beside those
+#: of its maps.
 RANGES, BEARINGS = np.linspace(0.0, 4.284, 96), np.radians(np.linspace(-43.0, 43.0, 88))
 #: m, cells of occupancy labels end at the radar's maximum range with a speed of light of 3e8 m/s.
 LABEL_RANGES = np.linspace(0.0, 3e8 * 2285e3 / (2 * 80e12), 96)

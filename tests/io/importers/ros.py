@@ -16,8 +16,8 @@ from radarize.radar.dca1000 import encode
 RADAR, ODOMETRY, IMU = "/radar0/radar_data", "/tracking/odom/sample", "/tracking/imu"
 CLOUD, DEPTH = "/ti_mmwave/radar_scan_pcl_0", "/camera/depth/image_rect_raw/compressedDepth"
 FRAME = "xwr_raw_ros/msg/RadarFrameFull"
-#: The message as xwr_raw_ros defines it (github.com/ConnectedSystemsLab/xwr_raw_ros, msg/RadarFrameFull.msg), by name and
-#: type.
+#: The message as xwr_raw_ros defines it (github.com/ConnectedSystemsLab/xwr_raw_ros, msg/RadarFrameFull.msg), by name
+#: and type.
 PUBLISHED = [
     ("header", "std_msgs/Header"), ("platform", "string"), ("adc_output_fmt", "uint8"), ("range_bias", "float32"),
     ("rx_phase_bias", "float32[]"), ("chirp_time", "float32"), ("chirp_slope", "float32"), ("frame_time", "float32"),
@@ -42,7 +42,7 @@ EPOCH = 1_700_000_000.0
 
 
 class BagWriter:
-    """Writes messages of keyword fields; `version` 1 or 2 of ROS; raw frames by a definition of ours, or `published`."""
+    """Writes messages of keyword fields; `version` 1 or 2 of ROS; frames by a definition of ours, or `published`."""
 
     def __init__(
         self, path: Path, version: int, storage: StoragePlugin = StoragePlugin.SQLITE3, published: bool = False

@@ -14,6 +14,8 @@ from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
 
+#: By how much settings may differ from the recording's: programs round them, xwr_raw_ros to two digits (33.33 ms).
+_ROUNDING = 2e-4
 #: What does not change the samples that the radar sends: corrections for whoever reads them.
 NOT_IN_SAMPLES = {"board", "range_bias", "channel_calibration"}
 _KEPT = 256 << 20  # bytes of a recording that, played in a loop, are unpacked once
@@ -53,7 +55,7 @@ class Playback:
             return recording.config
 
     def check(self, config: RadarConfig) -> None:
-        """Refuse any other configuration than the recording's.
+        """Refuse any other configuration than the recording's, roundings aside.
 
         Raises:
             InputError: naming the first field that differs.
@@ -83,4 +85,4 @@ def packed(frame: Int16[np.ndarray, "1 loop tx rx sample 2"], config: RadarConfi
 
 
 def _alike(first: float | tuple, second: float | tuple) -> bool:
-    return np.shape(first) == np.shape(second) and np.allclose(first, second, rtol=1e-9, atol=0)
+    return np.shape(first) == np.shape(second) and np.allclose(first, second, rtol=_ROUNDING, atol=0)

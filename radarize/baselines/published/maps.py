@@ -15,7 +15,8 @@ What the default maps do otherwise, and these on purpose do not:
 - The first frames have no maps, until the longest buffer is full. The artefact begins with the third frame, and gives
   it and the fourth the five-frame maps of the fifth, which come nearest in time: a stream cannot see ahead.
 
-Maps agree with those of the artefact's own code within 1e-4 (tests/baselines/test_published_golden.py).
+Maps agree with those of the artefact's own code within 1e-4 (tests/baselines/test_published_golden.py), but for some of
+100 cells in range bins with echoes 40 dB above the noise, where its single precision shows: up to 1e-3, 0.08 dB.
 """
 
 import numpy as np

@@ -294,7 +294,9 @@ def main(options: argparse.Namespace) -> Page:
         folder = Path(temporary)
         recording = folder / "walk.h5"
         walk = Walk(platform=PLATFORM, duration=DURATION)
-        simulate(SCENE, recording, platform=PLATFORM, duration=DURATION, seed=SEED, sensors="depth-strip,imu,points")
+        simulate(
+            SCENE, recording, platform=PLATFORM, duration=DURATION, seed=SEED, sensors=("depth-strip", "imu", "points")
+        )
         done = folder / "run"
         run(recording, done, odometry="doppler", scans="first-echo")
         environments = Path(options.environments).resolve() if options.environments else folder / "environments"

@@ -9,8 +9,7 @@ import numpy as np
 from radarize.evaluation.foxglove import Messages
 from radarize.evaluation.shownmaps import ShownMaps
 from radarize.evaluation.viewer import CAUSES, opened
-from radarize.io.exporters.ros2 import CAMERA, NOWHERE, OPTICAL, joined
-from radarize.io.pose import OPTICAL_TURN
+from radarize.io.pose import NOWHERE, OPTICAL_TURN, frame_between
 from radarize.io.recording import Recording
 from radarize.io.replacing import replacing
 from radarize.io.tum import planar
@@ -18,6 +17,7 @@ from radarize.pipeline.runfolder import RunFolder
 from radarize.signal.points import COLUMNS
 
 _BATCH = 16
+CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
 #: Colours of path types by label, red, green, blue; noise (255) and what has no colour are black.
 _CAUSES = np.array([[int(color[k : k + 2], 16) for k in (1, 3, 5)] for color in CAUSES] + [[0, 0, 0]], np.uint8)
 
@@ -83,11 +83,11 @@ def _write_truth(shown: Messages, recording: Recording, run: RunFolder | None) -
     odometry = None if run is None else run.odometry
     if odometry is not None and len(odometry[0]):
         k = int(np.abs(odometry[0] - times[0]).argmin())
-        shown.links(float(times[0]), [("odom", "world", joined(odometry[1][k], poses[0]))])
+        shown.links(float(times[0]), [("odom", "world", frame_between(odometry[1][k], poses[0]))])
     elif run is None:
         shown.links(start, [("base_link", "radar", NOWHERE)])
     for time, pose in zip(times, poses, strict=True):
-        own = [("base_link", "world", joined(NOWHERE, pose))] if run is None else []
+        own = [("base_link", "world", frame_between(NOWHERE, pose))] if run is None else []
         shown.links(float(time), [("world", "truth", pose), *own])
 
 

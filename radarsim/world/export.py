@@ -35,6 +35,7 @@ def export_scene(scene: Scene, output: str | Path) -> Path:
     content = _nodes(scene) if suffix == ".glb" else _whole(scene)
     with replacing(output) as part:
         data = content.export(file_type=suffix[1:])
+        assert isinstance(data, str | bytes)  # of single files
         part.write_bytes(data.encode() if isinstance(data, str) else data)
     return output
 

@@ -230,7 +230,7 @@ def test_truth_depth_path_types_and_points_are_in_the_file(tmp_path):
         "camera_depth_optical_frame": "camera_depth_frame",
     }  # fmt: skip
     true = [link.translation for link in links if link.child_frame_id == "truth"]
-    assert [(p.x, p.z) for p in true] == pytest.approx([(time, 1.0) for time in times])
+    assert np.array([(p.x, p.z) for p in true]) == pytest.approx(np.column_stack([times, np.ones(count)]))
     assert len(found["/truth/path"][0].poses) == count
     picture = found["/camera/depth/image_rect_raw"][1]
     assert picture.encoding == "16UC1" and np.array_equal(np.frombuffer(picture.data, "<u2"), depth[1].ravel())

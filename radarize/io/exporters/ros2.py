@@ -20,11 +20,10 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from radarize.io.errors import InputError
 from radarize.io.exporters.bagwriter import BagWriter, Message, header, message, vector
-from radarize.io.pose import OPTICAL_TURN, between
+from radarize.io.pose import NOWHERE, OPTICAL_TURN, between, frame_between
 from radarize.io.recording import Recording
 from radarize.io.tum import planar_poses
 from radarize.pipeline.log import Log
@@ -38,7 +37,6 @@ BASE, ODOM, RADAR, WORLD, TRUTH = "base_link", "odom", "radar", "world", "truth"
 #: s: added to stamps of the first day of 1970.
 EPOCH, _DAY = 1_700_000_000.0, 86_400.0
 CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
-NOWHERE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 _BATCH = 16
 _FLOAT32 = 7
 #: Data sets with a sensor's place on the radar, and the frame it is.
@@ -241,7 +239,7 @@ def _truth(recording: Recording, base: str | None) -> Iterator[Event]:
             yield time, "/truth/odom", _odometry_message(time, (WORLD, TRUTH), pose, twist, np.zeros((2, 3, 3)))
             links = [_transform(time, WORLD, TRUTH, pose)]
             if base is not None:
-                links.append(_transform(time, base, WORLD, joined(NOWHERE, pose)))
+                links.append(_transform(time, base, WORLD, frame_between(NOWHERE, pose)))
             yield time, "/tf", message("tf2_msgs/msg/TFMessage", transforms=links)
 
 
@@ -252,13 +250,7 @@ def _world(recording: Recording, log: Log) -> list[tuple[str, str, np.ndarray]]:
     if truth is None or not len(truth[0]) or not len(log.odometry):
         return []
     k = int(np.abs(log.odometry_times - truth[0][0]).argmin())
-    return [(ODOM, WORLD, joined(planar_poses(log.odometry[k : k + 1])[0], truth[1][0]))]
-
-
-def joined(here: Float[np.ndarray, "7"], there: Float[np.ndarray, "7"]) -> Float[np.ndarray, "7"]:
-    """Pose of the second's frame in the first's, where both are poses of one body."""
-    turn = Rotation.from_quat(here[3:]) * Rotation.from_quat(there[3:]).inv()
-    return np.array([*(here[:3] - turn.apply(there[:3])), *turn.as_quat()])
+    return [(ODOM, WORLD, frame_between(planar_poses(log.odometry[k : k + 1])[0], truth[1][0]))]
 
 
 def _depth(recording: Recording) -> Iterator[Event]:

@@ -204,6 +204,19 @@ def preview(
         print(picture)
 
 
+@scene_app.command("export")
+def export_(
+    scene: SceneName,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Mesh to write: .glb, .ply, .obj or .stl.")],
+) -> None:
+    """Write SCENE as a mesh, m, z up (glTF: y up)."""
+    from radarsim.world.export import export_scene
+    from radarsim.world.scene import Scene
+
+    with working("writing the scene"):
+        print(export_scene(Scene.load(scene), output))
+
+
 @scene_app.command("import")
 def import_(
     source: Annotated[

@@ -1,7 +1,7 @@
 """Commands that make runs, and what comes after one."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -115,17 +115,28 @@ def evaluate(
 @app.command()
 def export(
     source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of a bag, folder to write.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of ros2 and roverd, folder to write.")],
     format: Annotated[
-        str, typer.Option(help="bin (DCA1000 and .cfg), ros2 (a bag), tum (poses) or map (for map_server).")
+        str,
+        typer.Option(
+            help="bin (DCA1000 and .cfg), ros2 (a bag), radarize-ae (a ROS 1 bag for the paper's code), roverd, tum "
+            "(poses), ply (points of a recording, scans of a run) or map (for map_server)."
+        ),
     ],
     run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,
+    iq_order: Annotated[
+        Literal["iiqq", "qqii"] | None,
+        typer.Option(help="Of bin: mmWave Studio's order, or the SDK demo's; default: the recording's."),
+    ] = None,
+    time_offset: Annotated[
+        float | None, typer.Option(help="Of bags: s, added to stamps; default: 1.7e9 where they begin near zero.")
+    ] = None,
 ) -> None:
     """Write a recording or a run for other programs."""
     from radarize.io.exporters import export
 
     with progress("export") as report:
-        written = export(source, format, output, run=run, progress=report)
+        written = export(source, format, output, run=run, iq_order=iq_order, time_offset=time_offset, progress=report)
     print(written)
 
 

@@ -3,17 +3,20 @@
     /tf         map -> odom -> base_link -> radar, as ROS has them (REP 105)
     /scan       LaserScan, in `radar`        /path  PosesInFrame, in `map`
     /map        Grid, in `map`: occupancy of 0, 100 or -1, as in nav_msgs/OccupancyGrid
-    /radar/...  heat maps as images
+    /radar/...  heat maps and, of a simulated recording, path types as images; /radar/points  PointCloud, in `radar`
+    /truth/path  PosesInFrame, in `world`, whose `truth` is where the radar really is
+    /camera/depth/image_rect_raw  RawImage (16UC1, mm) and /camera/depth/camera_info
 
-``base_link`` is the radar: x forward, y left, z up (REP 103). Poses lie in a plane.
+``base_link`` is the radar: x forward, y left, z up (REP 103). Poses lie in a plane, but for those of the truth.
 """
 
 import math
+from collections.abc import Sequence
 
 import foxglove
 import numpy as np
 from foxglove import channels, messages
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, UInt8, UInt16
 
 from radarize.io.errors import InputError
 from radarize.io.pose import compose, inverse
@@ -37,6 +40,10 @@ class Messages:
         self._scan = channels.LaserScanChannel("/scan", context=context)
         self._path = channels.PosesInFrameChannel("/path", context=context)
         self._map = channels.GridChannel("/map", context=context)
+        self._true_path = channels.PosesInFrameChannel("/truth/path", context=context)
+        self._points = channels.PointCloudChannel("/radar/points", context=context)
+        self._depth = channels.RawImageChannel("/camera/depth/image_rect_raw", context=context)
+        self._lens = channels.CameraCalibrationChannel("/camera/depth/camera_info", context=context)
         self._pictures: dict[str, channels.RawImageChannel] = {}
 
     def pose(self, time: float, slam: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "3"]) -> None:
@@ -84,6 +91,54 @@ class Messages:
             ),
             log_time=_nanoseconds(time),
         )  # fmt: skip
+
+    def links(self, time: float, links: Sequence[tuple[str, str, Float[np.ndarray, "7"]]]) -> None:
+        """Transforms: parent, child, and x y z (m) qx qy qz qw of the child in the parent."""
+        transforms = [
+            messages.FrameTransform(
+                timestamp=_stamp(time), parent_frame_id=parent, child_frame_id=child,
+                translation=_vector(pose[:3]), rotation=_quaternion(pose[3:]),
+            )
+            for parent, child, pose in links
+        ]  # fmt: skip
+        self._tf.log(messages.FrameTransforms(transforms=transforms), log_time=_nanoseconds(time))
+
+    def true_path(self, time: float, poses: Float[np.ndarray, "pose 7"]) -> None:
+        """The true way, in `world`."""
+        way = [messages.Pose(position=_vector(pose[:3]), orientation=_quaternion(pose[3:])) for pose in poses]
+        found = messages.PosesInFrame(timestamp=_stamp(time), frame_id="world", poses=way)
+        self._true_path.log(found, log_time=_nanoseconds(time))
+
+    def points(self, time: float, cloud: Float[np.ndarray, "point column"], names: Sequence[str]) -> None:
+        """Points of a frame, in `radar`; columns by name, x, y and z (m) among them."""
+        float32 = messages.PackedElementFieldNumericType.Float32
+        fields = [messages.PackedElementField(name=name, offset=4 * k, type=float32) for k, name in enumerate(names)]
+        self._points.log(
+            messages.PointCloud(
+                timestamp=_stamp(time), frame_id="radar", pose=_pose(_HERE), point_stride=4 * len(names),
+                fields=fields, data=cloud.astype("<f4").tobytes(),
+            ),
+            log_time=_nanoseconds(time),
+        )  # fmt: skip
+
+    def depth(
+        self, time: float, picture: UInt16[np.ndarray, "row column"], pinhole: Float[np.ndarray, "4"] | None
+    ) -> None:
+        """A depth picture, mm, and fx, fy, cx, cy (pixels) of its lens."""
+        rows, columns = picture.shape
+        image = messages.RawImage(
+            timestamp=_stamp(time), frame_id="camera_depth_optical_frame", width=columns, height=rows,
+            encoding="16UC1", step=2 * columns, data=picture.astype("<u2").tobytes(),
+        )  # fmt: skip
+        self._depth.log(image, log_time=_nanoseconds(time))
+        if pinhole is not None:
+            fx, fy, cx, cy = map(float, pinhole)
+            lens = messages.CameraCalibration(
+                timestamp=_stamp(time), frame_id="camera_depth_optical_frame", width=columns, height=rows,
+                distortion_model="plumb_bob", D=[0.0] * 5, K=[fx, 0, cx, 0, fy, cy, 0, 0, 1],
+                R=[1, 0, 0, 0, 1, 0, 0, 0, 1], P=[fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0],
+            )  # fmt: skip
+            self._lens.log(lens, log_time=_nanoseconds(time))
 
     def picture(self, time: float, name: str, pixels: UInt8[np.ndarray, "row column color"]) -> None:
         """A heat map; colours are red, green, blue and maybe alpha."""
@@ -140,6 +195,15 @@ def _stamp(time: float) -> messages.Timestamp:
 
 def _turn(yaw: float) -> messages.Quaternion:
     return messages.Quaternion(x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+
+
+def _vector(values: Float[np.ndarray, "3"]) -> messages.Vector3:
+    return messages.Vector3(x=float(values[0]), y=float(values[1]), z=float(values[2]))
+
+
+def _quaternion(values: Float[np.ndarray, "4"]) -> messages.Quaternion:
+    x, y, z, w = map(float, values)
+    return messages.Quaternion(x=x, y=y, z=z, w=w)
 
 
 def _pose(pose: Float[np.ndarray, "3"]) -> messages.Pose:

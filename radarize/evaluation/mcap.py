@@ -8,13 +8,18 @@ import numpy as np
 
 from radarize.evaluation.foxglove import Messages
 from radarize.evaluation.shownmaps import ShownMaps
-from radarize.evaluation.viewer import opened
+from radarize.evaluation.viewer import CAUSES, opened
+from radarize.io.pose import NOWHERE, OPTICAL_TURN, frame_between
 from radarize.io.recording import Recording
 from radarize.io.replacing import replacing
 from radarize.io.tum import planar
 from radarize.pipeline.runfolder import RunFolder
+from radarize.signal.points import COLUMNS
 
 _BATCH = 16
+CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
+#: Colours of path types by label, red, green, blue; noise (255) and what has no colour are black.
+_CAUSES = np.array([[int(color[k : k + 2], 16) for k in (1, 3, 5)] for color in CAUSES] + [[0, 0, 0]], np.uint8)
 
 
 def write_mcap(
@@ -26,7 +31,8 @@ def write_mcap(
     """Write a file.
 
     Args:
-        source: a recording (``.h5``), of which heat maps are written, or a run's folder.
+        source: a recording (``.h5``), of which heat maps are written and, where it has them, true poses, depth
+            pictures, points and path types; or a run's folder.
         run: run of the recording: poses, path, map and scans.
         output: file to write (``.mcap``).
         progress: called with (frames done, frames in all).
@@ -41,6 +47,7 @@ def write_mcap(
             if folder is not None:
                 _write_run(shown, folder)
             if recording is not None:
+                _write_truth(shown, recording, folder)
                 _write_frames(shown, recording, progress)
     return output
 
@@ -61,6 +68,29 @@ def _write_run(shown: Messages, run: RunFolder) -> None:
             shown.scan(float(time), ranges, run.scans["azimuths"])
 
 
+def _write_truth(shown: Messages, recording: Recording, run: RunFolder | None) -> None:
+    """True poses and path. The world is fixed in odometry's frame where both begin, else moves about the radar, which
+    is where the truth is: as in ROS 2 bags (`radarize.io.exporters.ros2`)."""
+    truth = recording.true_poses()
+    start = float(recording.times[0] + recording.config.burst_center)
+    if recording.has("truth/depth_mount"):
+        optical = (CAMERA, OPTICAL, np.array([0.0, 0, 0, *OPTICAL_TURN]))
+        shown.links(start, [("base_link", CAMERA, recording.read("truth/depth_mount")), optical])
+    if truth is None or not len(truth[0]):
+        return
+    times, poses = truth
+    shown.true_path(float(times[0]), poses)
+    odometry = None if run is None else run.odometry
+    if odometry is not None and len(odometry[0]):
+        k = int(np.abs(odometry[0] - times[0]).argmin())
+        shown.links(float(times[0]), [("odom", "world", frame_between(odometry[1][k], poses[0]))])
+    elif run is None:
+        shown.links(start, [("base_link", "radar", NOWHERE)])
+    for time, pose in zip(times, poses, strict=True):
+        own = [("base_link", "world", frame_between(NOWHERE, pose))] if run is None else []
+        shown.links(float(time), [("world", "truth", pose), *own])
+
+
 def _write_frames(shown: Messages, recording: Recording, progress: Callable[[int, int], None]) -> None:
     maps = ShownMaps(recording)
     times = recording.times + recording.config.burst_center
@@ -69,4 +99,19 @@ def _write_frames(shown: Messages, recording: Recording, progress: Callable[[int
         for name, images in maps.of(first, last).items():
             for time, pixels in zip(times[first:last], images, strict=True):
                 shown.picture(float(time), name, pixels)
+        for k in range(first, last):
+            _write_sensors(shown, recording, k, float(times[k]))
         progress(last, len(recording))
+
+
+def _write_sensors(shown: Messages, recording: Recording, frame: int, time: float) -> None:
+    """Path types, depth picture and points of a frame, as far as the recording has them."""
+    if recording.has("truth/cause"):
+        cause = recording.rows("truth/cause", frame, frame + 1)[0, ::-1, ::-1]
+        shown.picture(time, "cause", _CAUSES[np.minimum(cause, len(_CAUSES) - 1)])
+    if recording.has("truth/depth"):
+        known = recording.has("truth/depth_intrinsics")
+        lens = recording.read("truth/depth_intrinsics") if known else None
+        shown.depth(time, recording.rows("truth/depth", frame, frame + 1)[0], lens)
+    if recording.has("points/frame") and recording.has("points/cloud"):
+        shown.points(time, recording.rows("points/cloud", frame, frame + 1), COLUMNS)

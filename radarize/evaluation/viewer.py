@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # an extra
 
 _BATCH = 16
 #: Colours of causes in the order of their labels: direct, floor or ceiling, then what is no wall.
-_CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
+CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
 
 
 def view(
@@ -225,7 +225,7 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
         screen.speeds(recording.times + config.burst_center, speeds, "truth")
     if recording.has("truth/cause"):
         names = recording.labels("truth/cause")
-        labels = [(k, name, _rgb(_CAUSES[k % len(_CAUSES)])) for k, name in enumerate(names)]
+        labels = [(k, name, _rgb(CAUSES[k % len(CAUSES)])) for k, name in enumerate(names)]
         screen.fixed("radar/cause", rr.AnnotationContext([*labels, (255, "noise", (0, 0, 0))]))
     if recording.has("truth/depth_mount") and recording.has("truth/depth_intrinsics"):
         _send_camera(screen, recording)

@@ -1,9 +1,10 @@
-"""Planar poses as arrays (..., 3): x m, y m, yaw rad. Leading axes broadcast."""
+"""Planar poses as arrays (..., 3): x m, y m, yaw rad. Leading axes broadcast. Below them, poses in space."""
 
 from typing import overload
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 Pose = Float[np.ndarray, "*#batch 3"]
 
@@ -89,3 +90,18 @@ def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.nd
         a, b = np.sin(turn) / turn, (1 - np.cos(turn)) / turn
     x, y = translation
     return np.array([a * x - b * y, b * x + a * y, turn])
+
+
+#: The pose x y z qx qy qz qw of what is where its frame of reference is.
+NOWHERE = np.array([0.0, 0, 0, 0, 0, 0, 1])
+
+
+def frame_between(here: Float[np.ndarray, "7"], there: Float[np.ndarray, "7"]) -> Float[np.ndarray, "7"]:
+    """Pose of the second's frame of reference in the first's, where both are poses of one body.
+
+    Example:
+        >>> frame_between(NOWHERE, np.array([1.0, 2, 0, 0, 0, 0, 1]))[:3]
+        array([-1., -2.,  0.])
+    """
+    turn = Rotation.from_quat(here[3:]) * Rotation.from_quat(there[3:]).inv()
+    return np.array([*(here[:3] - turn.apply(there[:3])), *turn.as_quat()])

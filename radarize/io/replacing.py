@@ -3,6 +3,7 @@
 import contextlib
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +32,24 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if isinstance(error, Exception) and not isinstance(error, InputError) and disk_full(error):
             raise DiskFull(f"{path}: cannot be written ({FULL})") from error  # libraries have errors of their own
         raise
+
+
+@contextmanager
+def new_folder(path: str | Path, what: str = "export") -> Iterator[Path]:
+    """A folder to write to, which becomes `path` when the block ends, and goes if it fails.
+
+    Raises:
+        InputError: it is there already and not empty, or cannot be written.
+    """
+    path = Path(path)
+    if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+        raise InputError(f"{path}: is there already, expected the name of a new folder for the {what}")
+    with explained(f"{path}: cannot be written", OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f"{path.name}.part") as folder:
+            part = Path(folder) / path.name
+            yield part
+            os.replace(part, path)
 
 
 class Replacement:

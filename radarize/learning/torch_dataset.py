@@ -7,7 +7,7 @@ from radarize.learning.training.dataset import FrameDataset
 
 
 def torch_dataset(
-    data: str | Path,
+    data: str | Path | Sequence[str | Path],
     *,
     features: Sequence[str] = ("range_azimuth", "doppler_azimuth"),
     labels: Sequence[str] = ("velocity",),
@@ -15,18 +15,23 @@ def torch_dataset(
     part: str = "train",
     window: int = 1,
     stride: int = 1,
+    cache: bool = False,
 ) -> FrameDataset:
-    """Read a folder of recordings as a torch `Dataset`, lazily, from any number of processes.
+    """Read recordings as a torch `Dataset`, lazily, from any number of processes.
+
+    Maps are in dB of squared ADC counts, 80 azimuths from -59.25 to 59.25 deg to the left; what each axis means, and
+    what the shipped networks divide by, is in `radarize.learning.training.dataset`, the numbers in the result's `axes`.
 
     Args:
-        data: folder of recordings, such as ``radarsim dataset`` makes.
-        features: maps of `radarize.signal.maps.MAPS` (float32, dB), ``adc`` (int16 samples), ``time`` (s).
+        data: a recording, several, or a folder of them, such as ``radarsim dataset`` makes.
+        features: maps of `radarize.signal.maps.MAPS` (float32, dB), ``adc`` (int16 samples), ``time`` (s, float64).
         labels: truth: ``velocity`` (m/s), ``turn`` (rad from frame to frame), ``pose``, ``scan`` (m), ``depth`` (mm),
             ``occupancy``.
         split, part: of the data set's specification: such as ``random-0`` and ``train``, ``validation`` or ``test``;
             all recordings without a split.
         window: frames of an item.
         stride: frames from one item's start to the next one's.
+        cache: keep maps in memory once they are made, in each worker process.
 
     Returns:
         Items are dictionaries of tensors by name, the window's frames along the first axis.
@@ -35,8 +40,8 @@ def torch_dataset(
         InputError: no recordings, an unknown name or split, or truth that a recording lacks.
 
     Example:
-        >>> dataset = rz.torch_dataset(".", features=["doppler_azimuth"], labels=["velocity"])
+        >>> dataset = rz.torch_dataset("walk.h5", features=["doppler_azimuth"], labels=["velocity"], cache=True)
         >>> {name: tuple(tensor.shape) for name, tensor in dataset[0].items()}
         {'doppler_azimuth': (1, 32, 80), 'velocity': (1, 3)}
     """
-    return FrameDataset(data, split, part, (*features, *labels), window, stride=stride)
+    return FrameDataset(data, split, part, (*features, *labels), window, stride=stride, cache=cache)

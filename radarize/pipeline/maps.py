@@ -6,23 +6,27 @@ from typing import Literal
 import numpy as np
 import torch
 import xarray
+from jaxtyping import Float
 
 from radarize.io.errors import InputError
 from radarize.io.load import Samples, Source, samples_of
 from radarize.signal.effort import together
-from radarize.signal.heatmaps import Heatmaps
+from radarize.signal.heatmaps import AZIMUTHS, Heatmaps
 
 Beamformer = Literal["bartlett", "capon", "elevation-aware"]
 _UNITS = {"range": "m", "doppler": "m/s", "azimuth": "rad"}
 
 
-def range_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
+def range_azimuth(
+    frames: Samples | Source, *, method: Beamformer = "bartlett", azimuths: Float[np.ndarray, "azimuth"] | None = None
+) -> xarray.DataArray:
     """Compute range-azimuth maps: power over range and azimuth, summed over Doppler.
 
     Args:
         frames: of a recording, such as ``rec[100:110]`` or ``rec[100]``; a recording for all of its frames.
         method: beamformer: ``"bartlett"`` (Taylor-windowed sum over the longest row of antennas), ``"capon"`` (minimum
             variance, sharper), or ``"elevation-aware"`` (pairs of antennas that weaken ceiling and floor).
+        azimuths: rad, positive to the left; -60 to 60 deg in steps of 1 deg if None.
 
     Returns:
         (frame, range, azimuth), without the axis of frames for a single frame; squared ADC counts, an echo of amplitude
@@ -46,16 +50,25 @@ def range_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") 
             return maps.elevation_aware_of(spectrum)
         return maps.range_azimuth_of(spectrum, method)
 
-    return _made(samples_of(frames), power, "range", "azimuth")
+    return _made(samples_of(frames), power, "range", "azimuth", azimuths=azimuths)
 
 
-def doppler_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
+def doppler_azimuth(
+    frames: Samples | Source,
+    *,
+    method: Beamformer = "bartlett",
+    azimuths: Float[np.ndarray, "azimuth"] | None = None,
+    limited: bool = False,
+) -> xarray.DataArray:
     """Compute Doppler-azimuth maps: power over closing speed and azimuth, summed over range.
 
     A static world that a radar of velocity v in direction theta sees lies at v cos(azimuth - theta).
 
     Args:
-        frames, method: see `range_azimuth`.
+        frames, method, azimuths: see `range_azimuth`.
+        limited: limit the amplitude of each cell of the spectrum first, so that specular reflections do not hide the
+            rest. With ``method="capon"`` and the azimuths of `radarize.signal.maps.AZIMUTHS` this is the map of that
+            name that networks and `rz.torch_dataset` see, there in dB.
 
     Returns:
         (frame, doppler, azimuth), without the axis of frames for a single frame; squared ADC counts. Coordinates:
@@ -71,9 +84,10 @@ def doppler_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett"
     _check("method", method, ("bartlett", "capon", "elevation-aware"))
 
     def power(maps: Heatmaps, spectrum: torch.Tensor) -> torch.Tensor:
-        return maps.doppler_azimuth_of(spectrum, method, elevation_aware=method == "elevation-aware")
+        cells = maps.limited(spectrum) if limited else spectrum
+        return maps.doppler_azimuth_of(cells, method, elevation_aware=method == "elevation-aware")
 
-    return _made(samples_of(frames), power, "doppler", "azimuth")
+    return _made(samples_of(frames), power, "doppler", "azimuth", azimuths=azimuths)
 
 
 def range_doppler(frames: Samples | Source) -> xarray.DataArray:
@@ -119,8 +133,14 @@ def range_profile(frames: Samples | Source) -> xarray.DataArray:
     return _made(samples_of(frames), Heatmaps.range_profile_of, "range")
 
 
-def _made(frames: Samples, power: Callable[[Heatmaps, torch.Tensor], torch.Tensor], *names: str) -> xarray.DataArray:
-    maps, size = Heatmaps(frames.config), together(frames.config)
+def _made(
+    frames: Samples,
+    power: Callable[[Heatmaps, torch.Tensor], torch.Tensor],
+    *names: str,
+    azimuths: Float[np.ndarray, "azimuth"] | None = None,
+) -> xarray.DataArray:
+    maps = Heatmaps(frames.config, AZIMUTHS if azimuths is None else azimuths)
+    size = together(frames.config)
     parts = (frames[start : start + size] for start in range(0, len(frames), size))
     made = [power(maps, maps.spectrum(part.samples, part.valid)).numpy() for part in parts]
     axes = {"range": maps.ranges, "doppler": maps.velocities, "azimuth": maps.azimuths}

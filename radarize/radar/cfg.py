@@ -12,7 +12,7 @@ from radarize.io.errors import InputError
 from radarize.io.files import read_bytes
 from radarize.io.jsonfile import parse_json
 from radarize.radar.array import losses
-from radarize.radar.boards import BOARDS, Board, likely_board, named_board
+from radarize.radar.boards import BOARDS, Board, likely_board, load_board, named_board
 from radarize.radar.commands import Command, commands_of
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, Firing, RadarConfig, fired
 from radarize.radar.lowpower import COMMANDS as LOW_POWER
@@ -338,6 +338,7 @@ def write_cfg(config: RadarConfig) -> str:
     board = config.board.model_dump_json() if isinstance(config.board, Board) else config.board
     swap = int(config.iq_order == "qqii")
     lines = [
+        *cfg_headers(config),
         f"% Board:{board}",
         *([f"% LoopIdleTime:{_text(config.loop_idle_time, 6)}"] if config.loop_idle_time else []),
         "sensorStop",
@@ -374,6 +375,17 @@ def write_cfg(config: RadarConfig) -> str:
         "sensorStart",
     ]
     return "\n".join(lines) + "\n"
+
+
+def cfg_headers(config: RadarConfig) -> list[str]:
+    """Comment lines of TI's visualizer that other programs read: radarize_ae and xwr_raw_ros refuse a file without.
+
+    Example:
+        >>> cfg_headers(PRESETS["radarize"])
+        ['% Created for SDK ver:03.06', '% Platform:xWR18xx']
+    """
+    chip = re.search(r"\d\d", load_board(config.board).chip)
+    return ["% Created for SDK ver:03.06", f"% Platform:xWR{chip[0] if chip else 'xx'}xx"]
 
 
 def _text(value: float, unit: int = 0) -> str:

@@ -21,6 +21,9 @@ _TICK = 8e-9  # s, unit of the packet delay
 _PACKET_HEAD = HEADER.size + 4  # counted in the packet size: the data header and 4 bytes more
 #: Shortest and longest delay between packets, s.
 DELAYS = (5e-6, 500e-6)
+#: Bytes, sizes of packets that a board takes; and s, the shortest delay that it does: xwr_raw_ros writes 25 where 25 us
+#: are 3125 ticks, and boards then send as fast as they can.
+SIZES, _MICROSECONDS_MEANT = (48, 1472), 25 * _TICK
 #: Body of CONFIGURE: raw mode, two lanes, capture, over Ethernet, 16 bit, timer.
 RAW_TWO_LANES = bytes([1, 2, 1, 2, 3, 30])
 #: Status of VERSION: 2.8, major and minor in 7 bits each.
@@ -124,15 +127,17 @@ def packet_settings(delay: float = 25e-6) -> bytes:
 def read_packet_settings(body: bytes) -> tuple[float, int]:
     """Delay (s) and payload (bytes) in the body of PACKETS.
 
+    TI's own program asks for packets of 1472 bytes, others for 1470: boards send 1456 bytes of samples for both.
+
     Raises:
         InputError: not such a body, or a value is out of range.
     """
     if len(body) != _PACKETS.size:
         raise InputError(f"packet settings of {len(body)} bytes, expected {_PACKETS.size}")
     size, ticks, _ = _PACKETS.unpack(body)
-    delay, payload = ticks * _TICK, size - _PACKET_HEAD
-    if not 0 < payload <= MAX_PAYLOAD:
-        raise InputError(f"packet size is {size} bytes, expected {_PACKET_HEAD + 1}-{MAX_PAYLOAD + _PACKET_HEAD}")
-    if not DELAYS[0] - _TICK <= delay <= DELAYS[1] + _TICK:
+    delay = ticks * _TICK
+    if not SIZES[0] <= size <= SIZES[1]:
+        raise InputError(f"packet size is {size} bytes, expected {SIZES[0]}-{SIZES[1]}")
+    if not _MICROSECONDS_MEANT <= delay <= DELAYS[1] + _TICK:
         raise InputError(f"packet delay is {delay * 1e6:g} us, expected 5-500 us")
-    return delay, payload
+    return delay, min(size - _PACKET_HEAD, MAX_PAYLOAD)

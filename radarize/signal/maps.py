@@ -66,11 +66,12 @@ class Maker(ABC):
     Attributes:
         maps: by name, what they are.
         history: frames before its own that a map needs.
+        warmup: first frames of a recording that networks do not see.
         physical: rows are metres or m/s, so that a network can be shown those of any chirp, see `Resampling`.
     """
 
     maps: dict[str, str]
-    history = 0
+    history = warmup = 0
     physical = False
 
     @abstractmethod
@@ -99,7 +100,7 @@ class Maker(ABC):
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         names: tuple[str, ...] | None = None,
         frames: slice | Int[np.ndarray, "map"] = slice(None),
-    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
+    ) -> dict[str, Float[np.ndarray, "map row azimuth"]]:
         """Maps of some of consecutive frames.
 
         Args:

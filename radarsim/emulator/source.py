@@ -14,6 +14,8 @@ from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
 
+#: By how much settings may differ from the recording's: programs round them, xwr_raw_ros to two digits (33.33 ms).
+_ROUNDING = 2e-4
 #: What does not change the samples that the radar sends: corrections for whoever reads them.
 NOT_IN_SAMPLES = {"board", "range_bias", "channel_calibration"}
 _KEPT = 256 << 20  # bytes of a recording that, played in a loop, are unpacked once
@@ -53,7 +55,7 @@ class Playback:
             return recording.config
 
     def check(self, config: RadarConfig) -> None:
-        """Refuse any other configuration than the recording's.
+        """Refuse any other configuration than the recording's, roundings aside.
 
         Raises:
             InputError: naming the first field that differs.
@@ -86,4 +88,4 @@ def _alike(first: object, second: object) -> bool:
     one, other = (value if isinstance(value, tuple) else (value,) for value in (first, second))
     if not all(isinstance(number, float) for number in one + other):
         return first == second
-    return len(one) == len(other) and np.allclose(np.array(one), np.array(other), rtol=1e-9, atol=0)
+    return len(one) == len(other) and np.allclose(np.array(one), np.array(other), rtol=_ROUNDING, atol=0)

@@ -119,6 +119,13 @@ def test_another_configuration_than_the_recordings_is_refused(playing, change, s
         raise AssertionError(said[-1])
 
 
+def test_roundings_of_other_programs_are_taken(playing):
+    """xwr_raw_ros writes two digits: 33.33 ms for 33.333."""
+    client, _, _ = playing
+    rounded = SMALL.model_copy(update={"frame_period": SMALL.frame_period * 33.33 / 33.333})
+    assert client.configure(rounded)[-1].endswith("Done\n\r" + PROMPT)
+
+
 def test_2500_packets_through_a_bad_network(tmp_path):
     """What arrives is what the seed says, in that order."""
     adc = record(tmp_path / "r.h5", CONFIG, 15)

@@ -16,13 +16,14 @@ from radarize.cli import app
 from radarize.io.console import run
 from radarize.io.errors import InputError
 from radarize.io.pose import compose
-from radarize.io.recording import RecordingWriter
+from radarize.io.recording import Product, RecordingWriter, Stream
 from radarize.pipeline.runfolder import OccupancyMap, RunFolder
 from radarize.pipeline.runfolder.occupancy import MapFile
 from radarize.radar.presets import PRESETS
 from tests.evaluation.fake_run import write_run
 
 Server = pytest.importorskip("radarize.evaluation.foxglove", reason="pip install 'radarize[viewer]'").Server
+write_mcap = pytest.importorskip("radarize.evaluation.mcap").write_mcap
 
 SLAM, ODOMETRY = np.array([2.0, 1.0, 0.5]), np.array([1.8, 1.3, 0.3])
 
@@ -193,3 +194,49 @@ def test_a_recording_and_its_run_become_a_file(tmp_path, capsys):
     assert np.array_equal(cells == 100, folder.map.occupied)
     for name in ("range_azimuth", "doppler_azimuth"):
         assert len(found[f"/radar/{name}"]) == 20 and found[f"/radar/{name}"][0][1].encoding == "rgb8"
+
+
+def test_truth_depth_path_types_and_points_are_in_the_file(tmp_path):
+    """A recording alone: the world moves about the radar, which is where the truth is."""
+    config, count = PRESETS["radarize"].model_copy(update={"loops": 4}), 3
+    times = np.arange(count) * config.frame_period
+    poses = np.column_stack([times, 0 * times, 1 + 0 * times, 0 * times, 0 * times, np.sin(times), np.cos(times)])
+    depth = np.arange(count * 6 * 8, dtype=np.uint16).reshape(count, 6, 8)
+    cause = np.full((count, 96, 80), 255, np.uint8)
+    cause[:, -1, -1] = 2
+    cloud = np.array([[1, 2, 3, 0.5, 12, 1], [4, 5, 6, -0.5, 11, 1]])
+    rows = {
+        "truth/time": times + config.burst_center, "truth/pose": poses, "truth/depth": depth, "truth/cause": cause,
+        "points/frame": np.array([0, 2]), "points/cloud": cloud,
+    }  # fmt: skip
+    streams = {name: Stream(data.shape[1:], data.dtype.str, "", "") for name, data in rows.items()}
+    streams["points/frame"] = Stream((), "i4", "", "", "points/frame")
+    streams["points/cloud"] = Stream((6,), "f4", "m", "", "points/frame")
+    mount = np.array([0.0, 0.1, 0, 0, 0, 0, 1])
+    products = {
+        "truth/depth_mount": Product(mount, "m", ""),
+        "truth/depth_intrinsics": Product(np.array([5.0, 6.0, 3.5, 2.5]), "pixels", ""),
+    }
+    with RecordingWriter(tmp_path / "walk.h5", config, streams=streams, products=products) as writer:
+        writer.append(np.ones((count, *config.frame_shape), np.int16), times, rows=rows)
+    write_mcap(tmp_path / "walk.h5", None, tmp_path / "walk.mcap")
+    found: dict[str, list] = {}
+    for topic, _, content in messages((tmp_path / "walk.mcap").read_bytes()):
+        found.setdefault(topic, []).append(content)
+    links = [link for content in found["/tf"] for link in content.transforms]
+    parents = {link.child_frame_id: link.parent_frame_id for link in links}
+    assert parents == {
+        "truth": "world", "world": "base_link", "radar": "base_link", "camera_depth_frame": "base_link",
+        "camera_depth_optical_frame": "camera_depth_frame",
+    }  # fmt: skip
+    true = [link.translation for link in links if link.child_frame_id == "truth"]
+    assert np.array([(p.x, p.z) for p in true]) == pytest.approx(np.column_stack([times, np.ones(count)]))
+    assert len(found["/truth/path"][0].poses) == count
+    picture = found["/camera/depth/image_rect_raw"][1]
+    assert picture.encoding == "16UC1" and np.array_equal(np.frombuffer(picture.data, "<u2"), depth[1].ravel())
+    assert list(found["/camera/depth/camera_info"][0].K)[:3] == [5, 0, 3.5]
+    shown = np.frombuffer(found["/radar/cause"][0].data, np.uint8).reshape(96, 80, 3)
+    assert shown[0, 0].any() and not shown[1:].any()  # far is up, left is left
+    clouds = [np.frombuffer(content.data, "<f4").reshape(-1, 6) for content in found["/radar/points"]]
+    assert [len(points) for points in clouds] == [1, 0, 1] and clouds[2][0] == pytest.approx(cloud[1])
+    assert [field.name for field in found["/radar/points"][0].fields][:4] == ["x", "y", "z", "velocity"]

@@ -6,9 +6,11 @@ from scipy.spatial.transform import Rotation
 
 from radarize.io.recording import Recording
 
-#: Cells of the occupancy label: 4.51 cm where the radar's bins have 4.46 cm, and bearings (rad, ascending to the left)
-#: beside those of its maps.
+#: Cells of scans: 4.51 cm where the radar's bins have 4.46 cm, and bearings (rad, ascending to the left) beside those
+#: of its maps.
 RANGES, BEARINGS = np.linspace(0.0, 4.284, 96), np.radians(np.linspace(-43.0, 43.0, 88))
+#: m, cells of occupancy labels end at the radar's maximum range with a speed of light of 3e8 m/s.
+LABEL_RANGES = np.linspace(0.0, 3e8 * 2285e3 / (2 * 80e12), 96)
 #: m, above and below the sensor's own plane, which is not levelled.
 SLAB = 0.03
 _BATCH = 64
@@ -52,7 +54,9 @@ def occupancy(recording: Recording, frames: slice) -> UInt8[np.ndarray, "frame r
 def occupied(
     depth: UInt16[np.ndarray, "frame row column"], pinhole: Float[np.ndarray, "4"]
 ) -> Bool[np.ndarray, "frame range bearing"]:
-    """Cells with a point in the camera's plane.
+    """Cells with a point in the camera's plane, and their neighbours one farther and one to the left.
+
+    Points whose nearest cell is the first or last of its row or column are left out.
 
     Args:
         depth: along the optical axis, mm, 0 where there is none.
@@ -62,12 +66,14 @@ def occupied(
     frames, rows, columns = depth.shape
     across, down = (np.arange(columns) - cx) / fx, (np.arange(rows) - cy) / fy
     forward = depth * 1e-3
-    distance = forward * np.hypot(1, across)
-    cell = np.rint(distance / (RANGES[1] - RANGES[0])).astype(int)
-    column = np.rint((-np.arctan(across) - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])).astype(int)
-    seen = (depth > 0) & (np.abs(forward * down[:, None]) <= SLAB) & (cell < len(RANGES))
-    seen &= (column >= 0) & (column < len(BEARINGS))
+    distance, azimuth = forward * np.hypot(1, across), -np.arctan(across)
+    cell = np.rint(distance / LABEL_RANGES[1]).astype(int)
+    column = np.rint((azimuth - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])).astype(int)
+    seen = (depth > 0) & (np.abs(forward * down[:, None]) < SLAB)
+    seen &= (cell >= 1) & (cell < len(LABEL_RANGES) - 1) & (column >= 1) & (column < len(BEARINGS) - 1)
     frame, _, at = seen.nonzero()
-    label = np.zeros((frames, len(RANGES), len(BEARINGS)), bool)
-    label[frame, cell[seen], column[at]] = True
+    label = np.zeros((frames, len(LABEL_RANGES), len(BEARINGS)), bool)
+    for farther in (0, 1):
+        for left in (0, 1):
+            label[frame, cell[seen] + farther, column[at] + left] = True
     return label

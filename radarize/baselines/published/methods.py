@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from radarize.baselines.published.artefact import read_artefact
 from radarize.baselines.published.maps import PublishedMaps, PublishedStream
 from radarize.baselines.published.networks import (
     PublishedRotationNet,
@@ -34,9 +35,12 @@ def _load(inputs: Inputs, network: type[Network]) -> Network:
     if inputs.weights.folder is None:
         raise InputError(
             "published odometry and scans come without weights: train them (`radarize train published-translation` and "
-            "so on) and name their folder with --weights"
+            "so on), or take the artefact's (published-translation.pth and so on), and name their folder with --weights"
         )
-    return load(inputs.weights.of(f"published-{network.kind}"), network, inputs.radar)[0]
+    path = inputs.weights.of(f"published-{network.kind}")
+    if not path.exists() and (theirs := path.with_suffix(".pth")).exists():
+        return read_artefact(theirs, network.kind, inputs.radar)[0]
+    return load(path, network, inputs.radar)[0]
 
 
 def _headings(inputs: Inputs) -> Float[np.ndarray, "4"] | None:
@@ -44,8 +48,8 @@ def _headings(inputs: Inputs) -> Float[np.ndarray, "4"] | None:
     source = inputs.recording
     if source is None or not source.has("truth/pose"):
         return None
-    stride = PublishedMaps.stride(inputs.radar)
-    yaws = planar(source.rows("truth/pose", 0, CHAINS * stride)[::stride])[:, 2]
+    stride, first = PublishedMaps.stride(inputs.radar), PublishedMaps.warmup
+    yaws = planar(source.rows("truth/pose", first, first + CHAINS * stride)[::stride])[:, 2]
     return yaws if len(yaws) == CHAINS and np.isfinite(yaws).all() else None
 
 

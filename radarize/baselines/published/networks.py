@@ -4,6 +4,7 @@ They see maps of 0...1 as they are, newest frame last, and answer with a number,
 covariance all the same, the same for every item: the error on validation data, for what comes after them.
 """
 
+import math
 from collections.abc import Sequence
 
 import torch
@@ -18,19 +19,18 @@ from radarize.signal.maps import Maps
 
 
 class Attention(nn.Module):
-    """Channels weighed by what all of an image says of them (Woo et al., "CBAM: convolutional block attention module",
-    2018, section 3.1)."""
+    """Efficient channel attention: channels weighed by what an image's mean says of them and their neighbours (Wang et
+    al., "ECA-Net: efficient channel attention for deep convolutional neural networks", 2020, equation 12)."""
 
-    def __init__(self, channels: int, reduction: int = 16):
+    def __init__(self, channels: int):
         super().__init__()
-        hidden = max(channels // reduction, 1)
-        self.mix = nn.Sequential(
-            nn.Conv2d(channels, hidden, 1, bias=False), nn.ReLU(), nn.Conv2d(hidden, channels, 1, bias=False)
-        )
+        size = int(abs((math.log2(channels) + 1) / 2))
+        size += 1 - size % 2
+        self.mix = nn.Conv1d(1, 1, size, padding=size // 2, bias=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        mean, most = x.mean(dim=(2, 3), keepdim=True), x.amax(dim=(2, 3), keepdim=True)
-        return x * torch.sigmoid(self.mix(mean) + self.mix(most))
+        weights = torch.sigmoid(self.mix(x.mean(dim=(2, 3))[:, None]))
+        return x * weights[:, 0, :, None, None]
 
 
 class PublishedMotionNet(Network):
@@ -77,9 +77,11 @@ class PublishedRotationNet(PublishedMotionNet):
                 last = module.body[-1]
                 assert isinstance(last, nn.BatchNorm2d)  # of a block over images
                 module.body.append(Attention(last.num_features))
-        layers = (8 * width, 32, 256, 1)
-        pairs = [(nn.Linear(a, b), nn.ReLU()) for a, b in zip(layers[:-1], layers[1:], strict=True)]
-        self.resnet.head = nn.Sequential(*[layer for pair in pairs for layer in pair][:-1])
+        self.resnet.head = nn.Sequential(nn.Linear(8 * width, 32), nn.Linear(32, 256), nn.ReLU(), nn.Linear(256, 1))
+
+    def forward(self, maps: Maps) -> Float[Tensor, "item 1"]:
+        """Of frames a, b and their maps 1, 3, 5: the channels are a1, a3, a5, b5, b3, b1, which time reverses."""
+        return self.resnet(torch.cat([maps[:, 0], maps[:, 1].flip(1)], dim=1))
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
         """Turn, the mean of forward and, negated, reverse; and its covariance."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float16
+from jaxtyping import Float
 
 from radarize.baselines.published.maps import PublishedStream
 from radarize.io.pose import between, wrap
@@ -85,7 +85,7 @@ class PublishedOdometry:
         return _track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy())
 
 
-def window(net: Network, made: dict[str, Float16[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
+def window(net: Network, made: dict[str, Float[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
     """What a network reads of frames: (frame, map, row, azimuth)."""
     return torch.stack([torch.from_numpy(made[name]).float() for name in net.maps], dim=1)
 

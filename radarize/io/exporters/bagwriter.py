@@ -3,8 +3,7 @@
 Version 8 of the format with sqlite3 storage is what every ROS 2 distribution since Humble plays.
 """
 
-import os
-import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -13,7 +12,7 @@ from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLi
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from radarize.io.errors import InputError, explained
+from radarize.io.replacing import new_folder
 
 _NEVER = QosTime(0, 0)
 #: Latched: who subscribes later gets it too, as /tf_static is meant to be.
@@ -52,37 +51,38 @@ class BagWriter:
 
     Args:
         path: folder to write; must not be there, or be empty.
+        later: s, added to all stamps.
 
     Raises:
         InputError: it is there, or cannot be written.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
-        if path.exists() and not (path.is_dir() and not any(path.iterdir())):
-            raise InputError(f"{path}: is there already, expected the name of a new folder for the bag")
-        with explained(f"{path}: cannot be written", OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._folder = tempfile.TemporaryDirectory(dir=path.parent, prefix=f"{path.name}.part")
-            self._writer = Writer(Path(self._folder.name) / path.name, version=8)
-            self._writer.open()
+    def __init__(self, path: Path, later: float = 0.0):
+        self.path, self._later = path, round(1e9 * later)
+        self._open = ExitStack()
+        part = self._open.enter_context(new_folder(path, "bag"))
+        self._writer = Writer(part, version=8)
+        self._writer.open()
+        self._open.callback(self._writer.close)
         self._connections: dict[str, Connection] = {}
 
     def __enter__(self) -> "BagWriter":
         return self
 
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: object) -> None:
-        with self._folder, explained(f"{self.path}: cannot be written", OSError):
-            self._writer.close()
-            if kind is None:
-                os.replace(Path(self._folder.name) / self.path.name, self.path)
+    def __exit__(self, *error: Any) -> None:
+        self._open.__exit__(*error)
 
-    def write(self, topic: str, time: float, content: Message) -> None:
-        """Append a message, received at `time`, s."""
+    def write(self, topic: str, time: float, content: Any) -> None:
+        """Append a message, received at `time`, s; its stamps are moved, too, and it is not to be used again."""
         kind = content.__msgtype__
         if topic not in self._connections:
             latched = (_LATCHED,) if topic == "/tf_static" else ()
             self._connections[topic] = self._writer.add_connection(
                 topic, kind, typestore=_TYPES, offered_qos_profiles=latched
             )
-        self._writer.write(self._connections[topic], round(1e9 * time), _TYPES.serialize_cdr(content, kind))
+        for each in getattr(content, "transforms", [content]) if self._later else ():
+            stamp = each.header.stamp
+            seconds, nanoseconds = divmod(stamp.sec * 10**9 + stamp.nanosec + self._later, 10**9)
+            each.header.stamp = message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+        received = round(1e9 * time) + self._later
+        self._writer.write(self._connections[topic], received, _TYPES.serialize_cdr(content, kind))

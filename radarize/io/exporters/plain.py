@@ -10,27 +10,33 @@ from radarize.io.recording import Recording
 from radarize.io.replacing import replacing
 from radarize.io.tum import write_tum
 from radarize.pipeline.runfolder import RunFolder
-from radarize.radar.cfg import parse_cfg, write_cfg
+from radarize.radar.cfg import cfg_headers, parse_cfg, write_cfg
 from radarize.radar.dca1000 import encode
 
 _BATCH_BYTES = 16 << 20
 
 
-def export_bin(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+def export_bin(
+    source: Path, output: Path, *, iq_order: str | None = None, progress: Callable[[int, int], None]
+) -> Path:
     """Write a recording's samples; ``.bin`` and ``.cfg`` are put in place of either suffix of `output`.
 
+    Words are in groups of four, ``Q0 Q1 I0 I1`` (``qqii``) or ``I0 I1 Q0 Q1`` (``iiqq``), and the third number of
+    ``adcbufCfg`` says which: 1 or 0.
+
     Raises:
-        InputError: no recording, or a file cannot be written.
+        InputError: no recording, an unknown order, or a file cannot be written.
     """
     with Recording(source) as recording:
-        config = recording.config
+        config = recording.config if iq_order is None else recording.config.changed("--iq-order", iq_order=iq_order)
         # A suffix such as .v2 belongs to the name.
         stem = output.with_suffix("") if output.suffix in (".bin", ".cfg") else output
         binary, settings = stem.with_name(stem.name + ".bin"), stem.with_name(stem.name + ".cfg")
         text = write_cfg(config)
         with suppress(InputError):
             if recording.cfg_text and parse_cfg(recording.cfg_text) == config:
-                text = recording.cfg_text  # with its own comments, since it says the same
+                lacking = [line for line in cfg_headers(config) if line.split(":")[0] not in recording.cfg_text]
+                text = "\n".join([*lacking, recording.cfg_text])  # with its own comments, since it says the same
 
         with replacing(settings) as part:
             part.write_bytes(text.encode())
@@ -41,7 +47,7 @@ def export_bin(source: Path, output: Path, *, run: None, progress: Callable[[int
     return binary
 
 
-def export_tum(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+def export_tum(source: Path, output: Path, *, progress: Callable[[int, int], None]) -> Path:
     """Write the trajectory of a run, or the true poses of a recording as far as they are known.
 
     Raises:
@@ -55,7 +61,7 @@ def export_tum(source: Path, output: Path, *, run: None, progress: Callable[[int
     return write_tum(output, *truth)
 
 
-def export_map(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+def export_map(source: Path, output: Path, *, progress: Callable[[int, int], None]) -> Path:
     """Write a run's map as ``NAME.pgm`` and ``NAME.yaml``.
 
     Raises:

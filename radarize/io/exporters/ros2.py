@@ -3,14 +3,19 @@
     of a run        /scan  LaserScan        /odom  Odometry        /tf  odom -> base_link
     of a recording  /radar/heatmap  PointCloud2 of the range-azimuth map, intensity in dB
                     /radar/points  PointCloud2        /imu  Imu        /camera/depth/image_rect_raw, camera_info
-                    /truth/odom  Odometry, the truth as far as it is known
+                    /truth/odom  Odometry, the truth as far as it is known        /tf  world -> truth
     always          /tf_static  base_link -> radar, imu, camera_depth_frame -> camera_depth_optical_frame
 
-``base_link`` is the radar: x forward, y left, z up (REP 103). Nothing publishes ``map``: that is the SLAM's to do.
+``base_link`` is the radar: x forward, y left, z up (REP 103). Nothing publishes ``map``: that is the SLAM's to do. The
+truth's frames hang below: ``odom -> world`` is fixed where both begin, so that drift shows; without a run, base_link
+is where the truth is, ``base_link -> world``. Either way a SLAM's ``map -> odom`` meets no second parent.
+
+Stamps near zero, a simulator's, are moved by 1,700,000,000 s (14 November 2023): ROS takes a stamp of zero for "none".
 """
 
 import heapq
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +23,7 @@ from jaxtyping import Float
 
 from radarize.io.errors import InputError
 from radarize.io.exporters.bagwriter import BagWriter, Message, header, message, vector
-from radarize.io.pose import OPTICAL_TURN, between
+from radarize.io.pose import NOWHERE, OPTICAL_TURN, between, frame_between
 from radarize.io.recording import Recording
 from radarize.io.tum import planar_poses
 from radarize.pipeline.log import Log
@@ -28,17 +33,25 @@ from radarize.signal.points import COLUMNS
 
 #: When, on which topic, and what.
 Event = tuple[float, str, Message]
-BASE, ODOM, RADAR = "base_link", "odom", "radar"
+BASE, ODOM, RADAR, WORLD, TRUTH = "base_link", "odom", "radar", "world", "truth"
+#: s: added to stamps of the first day of 1970.
+EPOCH, _DAY = 1_700_000_000.0, 86_400.0
 CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
-_NOWHERE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 _BATCH = 16
 _FLOAT32 = 7
 #: Data sets with a sensor's place on the radar, and the frame it is.
 _MOUNTS = {"imu/mount": "imu", "truth/depth_mount": CAMERA}
 
 
-def export_ros2(source: Path, output: Path, *, run: Path | None, progress: Callable[[int, int], None]) -> Path:
-    """Write a bag from a recording, a run's folder, or a recording and its run.
+def export_ros2(
+    source: Path,
+    output: Path,
+    *,
+    run: Path | None = None,
+    time_offset: float | None = None,
+    progress: Callable[[int, int], None],
+) -> Path:
+    """Write a bag from a recording, a run's folder, or a recording and its run; see `exporters.export`.
 
     Raises:
         InputError: unusable source, a run of another recording, or `output` is there already.
@@ -47,39 +60,52 @@ def export_ros2(source: Path, output: Path, *, run: Path | None, progress: Calla
         if run is not None:
             raise InputError(f"{source}: is a run's folder, and {run} another, expected a recording and a run")
         log = Log.read(source)
-        return _write(output, [_scans(log, None), _odometry(log)], [], "/scan", len(log.times), progress)
+        bag = BagWriter(output, stamp_offset(log.times, time_offset))
+        return _write(bag, [_scans(log, None), _odometry(log)], [], "/scan", partial(_tell, progress, len(log.times)))
     log_of_run = Log.read(run) if run is not None else None
     with Recording(source) as recording:
         if not len(recording):
             raise InputError(f"{source}: has no whole frame, expected at least one")
-        streams = [_heatmaps(recording), _truth(recording), _depth(recording), _inertial(recording), _points(recording)]
+        streams = [_heatmaps(recording), _depth(recording), _inertial(recording), _points(recording)]
+        mounts = _mounts(recording)
         if run is not None and log_of_run is not None:
             _check_pair(recording, log_of_run, run)
             streams += [_scans(log_of_run, recording.config), _odometry(log_of_run)]
-        return _write(output, streams, _mounts(recording), "/radar/heatmap", len(recording), progress)
+            mounts += _world(recording, log_of_run)
+        streams.append(_truth(recording, BASE if log_of_run is None else None))
+        bag = BagWriter(output, stamp_offset(recording.times, time_offset))
+        return _write(bag, streams, mounts, "/radar/heatmap", partial(_tell, progress, len(recording)))
+
+
+def stamp_offset(times: Float[np.ndarray, "frame"], given: float | None) -> float:
+    """What is added to stamps, s: see `exporters.export`."""
+    return given if given is not None else EPOCH if len(times) and abs(times[0]) < _DAY else 0.0
+
+
+def _tell(progress: Callable[[int, int], None], total: int, done: int) -> None:
+    progress(done, total)
 
 
 def _write(
-    output: Path,
+    bag: BagWriter,
     streams: list[Iterator[Event]],
     mounts: list[tuple[str, str, np.ndarray]],
     counted: str,
-    total: int,
-    progress: Callable[[int, int], None],
+    tell: Callable[[int], None],
 ) -> Path:
     """Merge streams by time; progress goes by the messages of one topic."""
     done, placed = 0, False
-    with BagWriter(output) as bag:
+    with bag:
         for time, topic, content in heapq.merge(*streams, key=lambda event: event[0]):
             if not placed:
-                static = [_transform(time, *mount) for mount in ((BASE, RADAR, _NOWHERE), *mounts)]
+                static = [_transform(time, *mount) for mount in ((BASE, RADAR, NOWHERE), *mounts)]
                 bag.write("/tf_static", time, message("tf2_msgs/msg/TFMessage", transforms=static))
                 placed = True
             bag.write(topic, time, content)
             if topic == counted:
                 done += 1
-                progress(done, total)
-    return output
+                tell(done)
+    return bag.path
 
 
 def _check_pair(recording: Recording, log: Log, run: Path) -> None:
@@ -107,40 +133,46 @@ def _scans(log: Log, config: RadarConfig | None) -> Iterator[Event]:
 
 
 def _odometry(log: Log) -> Iterator[Event]:
-    """Odometry with the covariance of the way since the start, and as a transform."""
-    poses, spreads = planar_poses(log.odometry), np.zeros((len(log.odometry), 3, 3))
-    if log.errors is not None and len(poses):
-        spreads = log.errors.since_start(log.odometry)
+    """Odometry with covariances of the way since the start and of the velocity since the pose before, and as a
+    transform. The first pose has the second one's velocity."""
+    count = len(log.odometry)
+    poses, spreads = planar_poses(log.odometry), np.zeros((count, 3, 3))
+    velocities, velocity_spreads = np.zeros((count, 3)), np.zeros((count, 3, 3))
+    if count > 1:
+        span = np.diff(log.odometry_times)[:, None]
+        velocities[1:] = between(log.odometry[:-1], log.odometry[1:]) / span
+        if log.errors is not None:
+            spreads = log.errors.since_start(log.odometry)
+            steps = log.errors.motions(log.odometry, np.arange(count - 1), 1)
+            velocity_spreads[1:] = steps / span[..., None] ** 2
+        velocities[0], velocity_spreads[0] = velocities[1], velocity_spreads[1]
     for k, (time, pose) in enumerate(zip(log.odometry_times, log.odometry, strict=True)):
-        velocity = np.zeros(3)
-        if k:
-            step = between(log.odometry[k - 1], pose)
-            velocity = step / (time - log.odometry_times[k - 1])
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])  # on the axes of the odometry's own frame
-        twist = np.array([velocity[0], velocity[1], 0, 0, 0, velocity[2]])
-        yield time, "/odom", _odometry_message(time, ODOM, BASE, poses[k], twist, turn @ spreads[k] @ turn.T)
+        twist = np.array([*velocities[k, :2], 0, 0, 0, velocities[k, 2]])
+        spread = np.stack([turn @ spreads[k] @ turn.T, velocity_spreads[k]])
+        yield time, "/odom", _odometry_message(time, (ODOM, BASE), poses[k], twist, spread)
         yield time, "/tf", message("tf2_msgs/msg/TFMessage", transforms=[_transform(time, ODOM, BASE, poses[k])])
 
 
 def _odometry_message(
     time: float,
-    frame: str,
-    child: str,
+    frames: tuple[str, str],
     pose: Float[np.ndarray, "7"],
     twist: Float[np.ndarray, "6"],
-    spread: Float[np.ndarray, "3 3"],
+    spread: Float[np.ndarray, "2 3 3"],
 ) -> Message:
-    covariance = np.zeros((6, 6))
-    covariance[np.ix_([0, 1, 5], [0, 1, 5])] = spread
+    """Of the second frame in the first; covariances of x, y and yaw of pose and twist."""
+    covariance = np.zeros((2, 6, 6))
+    covariance[np.ix_([0, 1], [0, 1, 5], [0, 1, 5])] = spread
     place = message(
         "geometry_msgs/msg/Pose", position=vector(pose[:3], "Point"), orientation=vector(pose[3:], "Quaternion")
     )
     motion = message("geometry_msgs/msg/Twist", linear=vector(twist[:3]), angular=vector(twist[3:]))
     return message(
-        "nav_msgs/msg/Odometry", header=header(time, frame), child_frame_id=child,
-        pose=message("geometry_msgs/msg/PoseWithCovariance", pose=place, covariance=covariance.reshape(-1)),
-        twist=message("geometry_msgs/msg/TwistWithCovariance", twist=motion, covariance=np.zeros(36)),
+        "nav_msgs/msg/Odometry", header=header(time, frames[0]), child_frame_id=frames[1],
+        pose=message("geometry_msgs/msg/PoseWithCovariance", pose=place, covariance=covariance[0].reshape(-1)),
+        twist=message("geometry_msgs/msg/TwistWithCovariance", twist=motion, covariance=covariance[1].reshape(-1)),
     )  # fmt: skip
 
 
@@ -196,14 +228,29 @@ def _cloud(time: float, cells: Float[np.ndarray, "row column field"], names: tup
     )  # fmt: skip
 
 
-def _truth(recording: Recording) -> Iterator[Event]:
+def _truth(recording: Recording, base: str | None) -> Iterator[Event]:
+    """The truth as odometry and as a transform; the world is placed on `base` where that is given."""
     if not (recording.has("truth/pose") and recording.has("truth/time")):
         return
     times, poses = recording.read("truth/time"), recording.read("truth/pose")
     twists = recording.read("truth/velocity") if recording.has("truth/velocity") else np.zeros((len(times), 6))
     for time, pose, twist in zip(times, poses, twists, strict=False):
         if np.isfinite(pose).all():
-            yield time, "/truth/odom", _odometry_message(time, "world", "truth", pose, twist, np.zeros((3, 3)))
+            yield time, "/truth/odom", _odometry_message(time, (WORLD, TRUTH), pose, twist, np.zeros((2, 3, 3)))
+            links = [_transform(time, WORLD, TRUTH, pose)]
+            if base is not None:
+                links.append(_transform(time, base, WORLD, frame_between(NOWHERE, pose)))
+            yield time, "/tf", message("tf2_msgs/msg/TFMessage", transforms=links)
+
+
+def _world(recording: Recording, log: Log) -> list[tuple[str, str, np.ndarray]]:
+    """The world's place in odometry's frame: both are one at the first pose of the odometry after which truth is
+    known."""
+    truth = recording.true_poses()
+    if truth is None or not len(truth[0]) or not len(log.odometry):
+        return []
+    k = int(np.abs(log.odometry_times - truth[0][0]).argmin())
+    return [(ODOM, WORLD, frame_between(planar_poses(log.odometry[k : k + 1])[0], truth[1][0]))]
 
 
 def _depth(recording: Recording) -> Iterator[Event]:

@@ -25,7 +25,7 @@ ASSUMED: dict[str, object] = {
     "adc_start_time": 6e-6,
 }
 #: s: the ramp goes on for a moment after the last sample; frames come ten a second, or with half their burst to spare.
-_AFTER_ADC = 1e-6
+AFTER_ADC = 1e-6
 _FRAME_PERIOD = 0.1
 
 
@@ -103,7 +103,7 @@ class Given:
         fields: dict[str, Any] = {"board": board.name, **ASSUMED, **given}
         try:
             adc_end = fields["adc_start_time"] + fields["samples"] / fields["sample_rate"]
-            fields.setdefault("ramp_end_time", adc_end + _AFTER_ADC)
+            fields.setdefault("ramp_end_time", adc_end + AFTER_ADC)
             burst = fields["loops"] * len(fields["tx_order"]) * (fields["idle_time"] + fields["ramp_end_time"])
             fields.setdefault("frame_period", max(_FRAME_PERIOD, 1.5 * burst))
         except (TypeError, ZeroDivisionError, OverflowError):

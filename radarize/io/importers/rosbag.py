@@ -24,16 +24,26 @@ from rosbags.typesys.store import Typestore
 
 from radarize.io.errors import explained
 
-#: What the Radarize data set's recorder publishes for every frame, where a bag does not say; header stamps stay unset.
+#: What the Radarize data set's recorder publishes for every frame, as its package defines it; header stamps stay unset.
+#: Phase biases are pairs of real and imaginary parts, chirp_time is in us, chirp_slope in Hz/s, frame_time in ms,
+#: sample_rate in Hz, and the shape is chirps, receivers, samples.
 FRAME_TYPE = "xwr_raw_ros/msg/RadarFrameFull"
 FRAME_DEFINITION = """std_msgs/Header header
-uint8 platform
+string platform
 uint8 adc_output_fmt
 float32 range_bias
 float32[] rx_phase_bias
+float32 chirp_time
+float32 chirp_slope
+float32 frame_time
+float32 velocity_max
+float32 velocity_res
+float32 sample_rate
+float32 range_max
+float32 range_res
 uint8[] rx
 uint8[] tx
-uint32[3] shape
+uint32[] shape
 int16[] data
 """
 #: A message as `rosbags` makes it: its fields are those of a definition that is read from the bag.

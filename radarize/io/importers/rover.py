@@ -2,6 +2,7 @@
 
 SEQUENCE/config.yaml          how it was recorded; radar: args: radar: chirps, in GHz, MHz/us, us, ksps and ms
          radar/meta.json      type and shape of each channel; iq: [loop, tx, rx, 2 x sample] of int16
+         radar/radar.json     range and Doppler resolution, m and m/s; in our exports also the order of transmitters
          radar/iq, ts         words of the radar frame by frame; stamps, s
          radar/valid          0 of frames in which lost packets were filled with zeros
          _radar/pose.npz      poses by a lidar's SLAM: t (s), pos (m), rot (matrices); x forward, y left, z up
@@ -10,7 +11,7 @@ SEQUENCE/config.yaml          how it was recorded; radar: args: radar: chirps, i
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Int16
@@ -20,12 +21,12 @@ from radarize.io.errors import InputError, explained
 from radarize.io.files import read_text, regular
 from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
-from radarize.io.importers.parameters import Given
+from radarize.io.importers.parameters import AFTER_ADC, ASSUMED, Given
 from radarize.io.jsonfile import parse_json
 from radarize.io.npyfile import read_npz
 from radarize.io.recording import Product
 from radarize.io.yamlfile import read_yaml
-from radarize.radar.config import RadarConfig
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
 
 #: Transmitters that fire, one after the other: with two, the raised one in the middle of the row is left out.
@@ -81,19 +82,28 @@ def open_sequence(source: Path, given: Given) -> Capture:
     if len(words.shape) != 4 or words.shape[1] not in _TRANSMITTERS or words.shape[3] % 2:
         raise InputError(f"{words.path}: has shape {words.shape}, expected loops, 1 to 3 tx, rx and twice the samples")
     loops, tx, rx, numbers = words.shape
-    found = {"loops": loops, "tx_order": _TRANSMITTERS[tx], "rx": rx, "samples": numbers // 2}
-    config, assumed = given.configure(str(source), _chirps(source / "config.yaml") | found)
+    found: dict[str, Any] = {"loops": loops, "tx_order": _TRANSMITTERS[tx], "rx": rx, "samples": numbers // 2}
+    told = _intrinsics(sensor / "radar.json")
+    chirps = _chirps(source / "config.yaml") | found
+    said = {name: value for name, value in given.overrides.items() if value is not None}
+    config, assumed = given.configure(str(source), _resolved(chirps | said, told) | chirps)
+    fired = _fired(sensor / "radar.json", told, config)
+    if "tx_order" in told:
+        config = config.model_copy(update={"tx_order": config.tx})  # of our exports: words are in the order of antennas
     check_layout(config)
     if (config.loops, len(config.tx), len(config.rx), 2 * config.samples) != words.shape:
         raise InputError(f"{words.path}: has shape {words.shape}, expected that of the configuration's frames")
+    for channel in (words, stamps):
+        if not channel.frames:
+            size = channel.path.stat().st_size
+            raise InputError(f"{channel.path}: has {size} bytes, expected {channel.frame_bytes} a frame")
     count = min(words.frames, stamps.frames)
-    if not count:
-        raise InputError(f"{words.path}: has {words.path.stat().st_size} bytes, expected {words.frame_bytes} a frame")
     doubtful = np.zeros(count, bool)
     if "valid" in meta:
-        told = _channel(sensor, meta, "valid", "u1").read(0, count)
-        doubtful[: len(told)] = told == 0
-    capture = Capture(config, "", (), count, assumed, products=_poses(source / "_radar" / "pose.npz"))
+        whole = _channel(sensor, meta, "valid", "u1").read(0, count)
+        doubtful[: len(whole)] = whole == 0
+    capture = Capture(fired, "", (), count, assumed, products=_poses(source / "_radar" / "pose.npz"))
+    capture.warnings += _contradictions(sensor / "radar.json", told, config)
     capture.batches = _batches(words, stamps, doubtful, config)
     return capture
 
@@ -137,8 +147,67 @@ def _chirps(path: Path) -> dict[str, object]:
     for field, (name, unit) in _FIELDS.items():
         if not isinstance(value := settings.get(name), int | float) or isinstance(value, bool):
             raise InputError(f"{path}: radar.args.radar.{name} is {str(value)[:40]}, expected a number")
-        found[field] = value * unit
+        found[field] = float(f"{value * unit:.12g}")  # 20 us is 2e-05, not 1.9999999999999998e-05
     return found
+
+
+def _intrinsics(path: Path) -> dict[str, Any]:
+    """What the rig's program computed of its chirps; nothing where there is none.
+
+    Raises:
+        InputError: it is no JSON, or a resolution is no positive number.
+    """
+    if not path.exists():
+        return {}
+    found = parse_json(read_text(path, "JSON"), str(path))
+    for name in ("range_resolution", "doppler_resolution"):
+        value = found.get(name, 1.0)
+        if not isinstance(value, int | float) or isinstance(value, bool) or not 1e-6 < value < 1e6:
+            raise InputError(f"{path}: {name} is {str(value)[:40]}, expected a positive number")
+    return found
+
+
+def _resolved(chirps: dict[str, Any], told: dict[str, Any]) -> dict[str, Any]:
+    """Slope (Hz/s) and idle time (s) that give the resolutions, with what is assumed of the rest."""
+    found: dict[str, Any] = {}
+    fields: dict[str, Any] = ASSUMED | chirps
+    window = fields["samples"] / fields["sample_rate"]
+    if "range_resolution" in told:
+        found["slope"] = SPEED_OF_LIGHT / (2 * told["range_resolution"] * window)
+    if "doppler_resolution" in told:
+        slope = fields["slope"] if "slope" in chirps else found.get("slope", fields["slope"])
+        frequency = fields["start_frequency"] + slope * (fields["adc_start_time"] + window / 2)
+        chirp = (
+            SPEED_OF_LIGHT / frequency / (2 * told["doppler_resolution"] * fields["loops"] * len(fields["tx_order"]))
+        )
+        ramp = fields.get("ramp_end_time", fields["adc_start_time"] + window + AFTER_ADC)
+        if chirp > ramp:
+            found["idle_time"] = chirp - ramp
+    return found
+
+
+def _fired(path: Path, told: dict[str, Any], config: RadarConfig) -> RadarConfig:
+    """The configuration with the order in which transmitters fired: words come in the order of antennas.
+
+    Raises:
+        InputError: the order is not one of these transmitters.
+    """
+    order = told.get("tx_order")
+    if order is None or len(config.tx_order) != len(set(config.tx)):
+        return config
+    if not isinstance(order, list) or sorted(map(str, order)) != [str(tx + 1) for tx in config.tx]:
+        raise InputError(f"{path}: tx_order is {str(order)[:40]}, expected {[tx + 1 for tx in config.tx]} in any order")
+    return config.changed(str(path), tx_order=tuple(int(tx) - 1 for tx in order))
+
+
+def _contradictions(path: Path, told: dict[str, Any], config: RadarConfig) -> list[str]:
+    """Where the configuration and what the rig's program computed of it differ by more than a hundredth."""
+    own = {"range_resolution": config.range_resolution, "doppler_resolution": config.velocity_resolution}
+    return [
+        f"{path}: {name} is {told[name]:.6g}, but the configuration has {value:.6g}"
+        for name, value in own.items()
+        if name in told and abs(told[name] / value - 1) > 0.01
+    ]
 
 
 def _poses(path: Path) -> dict[str, Product]:

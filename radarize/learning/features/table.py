@@ -195,7 +195,12 @@ def _open(
     with Recording(path) as recording:
         stride = maker.stride(recording.config)
         grids = {name: grid or MapGrid.of(recording.config, name, maker) for name in maps}
-        return -(-len(recording) // stride), stride * recording.config.frame_period, grids
+        return _seen(recording, maker), stride * recording.config.frame_period, grids
+
+
+def _seen(recording: Recording, maker: type[Maker]) -> int:
+    """Frames of a recording that networks see."""
+    return max(0, -(-(len(recording) - maker.warmup) // maker.stride(recording.config)))
 
 
 def _read(
@@ -206,7 +211,7 @@ def _read(
         maker, count = kind(recording.config), len(recording)
         stride = maker.stride(recording.config)
         size = _BATCH * stride
-        starts = range(0, count if maps else 0, size)
+        starts = range(kind.warmup, count if maps else 0, size)
         own, bring = {}, {}
         if grid is not None:
             own = {name: MapGrid.of(recording.config, name, kind) for name in maps}
@@ -215,20 +220,22 @@ def _read(
         for start in starts:
             made = maps_of(recording, start, min(start + size, count), maps, maker, stride)
             parts.append({name: _brought(values, bring.get(name)) for name, values in made.items()})
-        found, frames = {}, slice(0, count, stride)
+        found, frames = {}, slice(kind.warmup, count, stride)
         for reading in readings:
             rows = reading.rows(recording, frames)
             if grid is not None and reading.on_grid is not None:
                 rows = reading.on_grid(rows, own[maps[0]], grid)
             found[reading.name] = rows
             # Some may be unknown: a tracking camera is blind now and then.
-            if len(rows) < -(-count // stride) or not np.isfinite(rows).any():
+            if len(rows) < _seen(recording, kind) or not np.isfinite(rows).any():
                 raise InputError(f"{path}: /{reading.where} lacks values or holds no numbers, expected {count} frames")
         return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found
 
 
 def _brought(
-    made: Float16[np.ndarray, "frame row azimuth"], resampling: Resampling | None
+    made: Float[np.ndarray, "frame row azimuth"], resampling: Resampling | None
 ) -> Float16[np.ndarray, "frame known azimuth"]:
     """Maps on another grid, if there is one."""
-    return made if resampling is None else resampling(torch.from_numpy(made).float()[:, None])[:, 0].half().numpy()
+    if resampling is None:
+        return made.astype(np.float16, copy=False)
+    return resampling(torch.from_numpy(made).float()[:, None])[:, 0].half().numpy()

@@ -1,4 +1,21 @@
-"""Recordings as a torch `Dataset`: windows of frames with their truth, read lazily, from any number of processes."""
+"""Recordings as a torch `Dataset`: windows of frames with their truth, read lazily, from any number of processes.
+
+| field | axes, after those of the window | unit |
+|---|---|---|
+| range_azimuth, elevation_aware | range bins from 0, azimuth -59.25...59.25 deg ascending to the left (80) | dB |
+| doppler_azimuth, doppler_elevation_aware | closing speed ascending, zero in row n / 2; azimuth as above | dB |
+| adc | loop, tx, rx, sample, I and Q; int16 | counts |
+| time | (none); float64: start of the frame | s |
+| velocity, pose | forward, left, up; x y z qx qy qz qw | m/s; m |
+| turn | (none), one fewer than frames: change of yaw, positive to the left | rad |
+| scan | bearing, `radarize.signal.bearings.BEARINGS` | m |
+| depth, occupancy | row, column; range cell, azimuth | mm; class |
+
+`FrameDataset.axes` has the numbers. Maps are those that the shipped networks see: what `rz.range_azimuth` and
+`rz.doppler_azimuth` compute, of those azimuths, and of a spectrum that is limited in the case of Doppler, in dB of
+squared ADC counts from -30 on, rounded to a quarter (`radarize.signal.maps`). Networks take them less their own mean
+over 10 (`radarize.learning.nets.maps.level`), so that the receiver's gain drops out.
+"""
 
 import os
 from collections.abc import Sequence
@@ -13,7 +30,7 @@ from radarize.io.jsonfile import read_json
 from radarize.io.pose import wrap
 from radarize.io.recording import Recording
 from radarize.io.tum import planar
-from radarize.signal.maps import MAPS, MapMaker, maps_of
+from radarize.signal.maps import MAPS, Axes, MapMaker, maps_of
 
 #: Truth by the name of a field, as the path in the recording and the columns of it.
 TRUTH = {
@@ -27,18 +44,21 @@ DEFAULT = ("range_azimuth", "elevation_aware", "doppler_azimuth", "doppler_eleva
 
 
 class FrameDataset(Dataset):
-    """Windows of frames of the recordings in a folder, as dictionaries of tensors.
+    """Windows of frames of recordings, as dictionaries of tensors.
 
     Args:
-        folder: what `radarsim dataset` wrote, or any folder of recordings (then without splits).
+        folder: what `radarsim dataset` wrote, or any folder of recordings, or a recording, or several (all but the
+            first without splits).
         split: a name of the specification's splits, such as ``random-0``; None for all recordings.
         part: ``train``, ``validation`` or ``test``.
         fields: of an item, each with the window as its first axis: maps (`radarize.signal.maps.MAPS`, float32, dB),
-            ``adc`` (int16 samples), ``time`` (s), truth (`TRUTH`), and ``turn``: the change of yaw from each frame of
-            the window to the next, rad, positive to the left, one fewer than frames.
+            ``adc`` (int16 samples), ``time`` (s, float64), truth (`TRUTH`), and ``turn``: the change of yaw from each
+            frame of the window to the next, rad, positive to the left, one fewer than frames.
         window: frames of an item.
         spacing: frames from one frame of a window to the next.
         stride: frames from one window's start to the next one's.
+        cache: keep maps in memory once they are made, 31 kB a frame and map of 96 x 80 cells, in each worker process
+            (so let them be persistent): made anew of samples, they take some 10 ms a frame.
 
     Raises:
         InputError: no recordings, an unknown split, part or field, or truth that a recording lacks.
@@ -46,13 +66,14 @@ class FrameDataset(Dataset):
 
     def __init__(
         self,
-        folder: str | Path,
+        folder: str | Path | Sequence[str | Path],
         split: str | None = None,
         part: str = "train",
         fields: Sequence[str] = DEFAULT,
         window: int = 2,
         spacing: int = 1,
         stride: int = 1,
+        cache: bool = False,
     ):
         known = (*MAPS, "adc", "time", "turn", *TRUTH)
         for field in fields:
@@ -65,6 +86,7 @@ class FrameDataset(Dataset):
         self.fields, self.window, self.spacing, self.stride = tuple(fields), window, spacing, stride
         self.paths = recordings(folder, split, part)
         self._open: dict[tuple[int, int], tuple[Recording, MapMaker]] = {}
+        self._cache, self._kept = cache, dict[tuple[int, int], dict[str, np.ndarray]]()
         self._ends = np.cumsum([self._count(path) for path in self.paths])
         if not self._ends[-1]:
             raise InputError(f"{folder}: no recording has {self._reach} frames, expected enough for a window")
@@ -83,6 +105,17 @@ class FrameDataset(Dataset):
     def _reach(self) -> int:
         return (self.window - 1) * self.spacing + 1
 
+    @property
+    def axes(self) -> dict[str, Axes]:
+        """Rows, step from row to row (m or m/s) and azimuths (rad) of the maps, of the first recording's radar.
+
+        Example:
+            >>> rz.torch_dataset("walk.h5", features=["doppler_azimuth"]).axes["doppler_azimuth"].step  # m/s
+            0.118...
+        """
+        with Recording(self.paths[0]) as recording:
+            return {field: MapMaker.axes(recording.config, field) for field in self.fields if field in MAPS}
+
     def __len__(self) -> int:
         return int(self._ends[-1])
 
@@ -92,13 +125,13 @@ class FrameDataset(Dataset):
         index %= len(self)
         number = int(np.searchsorted(self._ends, index, side="right"))
         first = (index - (int(self._ends[number - 1]) if number else 0)) * self.stride
-        recording, maker = self._recording(number)
+        recording, _ = self._recording(number)
         frames = slice(first, first + self._reach, self.spacing)
 
         item: dict[str, np.ndarray] = {}
         names = tuple(field for field in self.fields if field in MAPS)
         if names:
-            item |= maps_of(recording, first, frames.stop, names, maker, self.spacing)
+            item |= self._maps(number, frames, names)
         for field in self.fields:
             if field in TRUTH:
                 path, columns = TRUTH[field]
@@ -110,7 +143,19 @@ class FrameDataset(Dataset):
             elif field == "turn":
                 poses = recording.rows("truth/pose", first, frames.stop)[:: self.spacing]
                 item[field] = wrap(np.diff(planar(poses)[:, 2]))
-        return {name: _tensor(item[name]) for name in self.fields}
+        return {name: _tensor(item[name], exact=name == "time") for name in self.fields}
+
+    def _maps(self, number: int, frames: slice, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Maps of a window of a recording's frames."""
+        recording, maker = self._recording(number)
+        if not self._cache:
+            return maps_of(recording, frames.start, frames.stop, names, maker, self.spacing)
+        wanted = range(frames.start, frames.stop, self.spacing)
+        for frame in wanted:
+            if (number, frame) not in self._kept:
+                made = maps_of(recording, frame, frame + 1, names, maker)
+                self._kept[number, frame] = {name: values[0].copy() for name, values in made.items()}
+        return {name: np.stack([self._kept[number, frame][name] for frame in wanted]) for name in names}
 
     def _recording(self, number: int) -> tuple[Recording, MapMaker]:
         """Opened at first use, by every process for itself: HDF5 files do not survive a fork."""
@@ -124,12 +169,22 @@ class FrameDataset(Dataset):
         return self.__dict__ | {"_open": {}}
 
 
-def recordings(folder: str | Path, split: str | None = None, part: str = "train") -> list[Path]:
-    """Recordings of a folder, or of one part of a split of its specification.
+def recordings(folder: str | Path | Sequence[str | Path], split: str | None = None, part: str = "train") -> list[Path]:
+    """Recordings of a folder, or of one part of a split of its specification; or those that are named.
 
     Raises:
         InputError: none there, no such split or part, or one that has not been made yet.
     """
+    if isinstance(folder, str | Path) and Path(folder).suffix == ".h5" and not Path(folder).is_dir():
+        folder = [folder]
+    if not isinstance(folder, str | Path):
+        if split is not None:
+            raise InputError(
+                f"split is {split!r}, but single recordings are named, expected a folder with dataset.json"
+            )
+        if not folder:
+            raise InputError("data names no recording, expected at least one")
+        return [Path(path) for path in folder]
     folder = Path(folder)
     if split is None:
         found = sorted(folder.glob("*.h5"))
@@ -153,6 +208,7 @@ def recordings(folder: str | Path, split: str | None = None, part: str = "train"
     return found
 
 
-def _tensor(values: np.ndarray) -> torch.Tensor:
+def _tensor(values: np.ndarray, exact: bool = False) -> torch.Tensor:
+    """Numbers as float32, but where float64 is needed: stamps of frames differ in the 11th digit."""
     values = np.asarray(values)
-    return torch.from_numpy(values.astype(np.float32) if values.dtype.kind == "f" else values)
+    return torch.from_numpy(values.astype(np.float32) if values.dtype.kind == "f" and not exact else values)

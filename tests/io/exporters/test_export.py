@@ -23,7 +23,9 @@ def test_names(recording, tmp_path, name):
 
 
 def test_refusals(recording, tmp_path):
-    with pytest.raises(InputError, match="export format is 'wav', expected one of bin, map, ros2, tum"):
+    with pytest.raises(
+        InputError, match="export format is 'wav', expected one of bin, map, ply, radarize-ae, ros2, roverd, tum"
+    ):
         export(recording, "wav", tmp_path / "out")
     with pytest.raises(InputError, match="has no true poses"):
         export(recording, "tum", tmp_path / "out.tum")

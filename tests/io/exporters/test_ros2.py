@@ -119,8 +119,9 @@ def stamp(message) -> float:
 
 def test_topics(bag):
     assert {topic: len(found) for topic, found in bag.items()} == {
-        "/scan": COUNT, "/odom": COUNT, "/tf": COUNT, "/tf_static": 1, "/radar/heatmap": COUNT, "/radar/points": COUNT,
-        "/imu": 84, "/camera/depth/image_rect_raw": COUNT, "/camera/depth/camera_info": COUNT, "/truth/odom": COUNT - 1,
+        "/scan": COUNT, "/odom": COUNT, "/tf": 2 * COUNT - 1, "/tf_static": 1, "/radar/heatmap": COUNT,
+        "/radar/points": COUNT, "/imu": 84, "/camera/depth/image_rect_raw": COUNT, "/camera/depth/camera_info": COUNT,
+        "/truth/odom": COUNT - 1,
     }  # fmt: skip
     for topic, found in bag.items():
         if topic not in ("/tf", "/tf_static"):
@@ -136,7 +137,8 @@ def test_scans(bag):
 
 
 def test_odometry_and_its_transform(bag):
-    for (_, odometry), (_, tf), expected in zip(bag["/odom"], bag["/tf"], poses(), strict=True):
+    links = [tf for _, tf in bag["/tf"] if tf.transforms[0].child_frame_id == "base_link"]
+    for (_, odometry), tf, expected in zip(bag["/odom"], links, poses(), strict=True):
         place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
         found = planar(np.array([[place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]]))[0]
         assert found == pytest.approx(expected, abs=1e-8)
@@ -163,6 +165,58 @@ def test_covariance_adds_up_as_in_a_simulation():
     for _ in range(COUNT - 1):
         walks = compose(compose(walks, STEP), rng.multivariate_normal(np.zeros(3), error, len(walks)))
     assert claimed[np.ix_([0, 1, 5], [0, 1, 5])] == pytest.approx(np.cov(walks.T), rel=0.1, abs=2e-4)
+
+
+def test_covariance_of_the_velocity_is_that_of_a_step():
+    from radarize.io.exporters.ros2 import _odometry
+    from radarize.pipeline.log import Log
+
+    error = np.diag([0.01, 0.02, 0.03]) ** 2
+    log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), ErrorModel.independent(np.tile(error, (COUNT, 1, 1))))
+    twists = [message.twist for _, topic, message in _odometry(log) if topic == "/odom"]
+    for twist in (twists[0], twists[7]):
+        claimed = twist.covariance.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
+        assert claimed == pytest.approx(error / CONFIG.frame_period**2, rel=0.02, abs=1e-4)
+        assert twist.twist.linear.x == pytest.approx(STEP[0] / CONFIG.frame_period, abs=1e-4)
+
+
+def place(links, frame, root) -> np.ndarray:
+    """Pose of a frame in another as a matrix, by the transforms between them, child to parent."""
+    found = np.eye(4)
+    while frame != root:
+        parent, t = links[frame]
+        step = np.eye(4)
+        q = t.rotation
+        step[:3, :3] = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+        step[:3, 3] = t.translation.x, t.translation.y, t.translation.z
+        found, frame = step @ found, parent
+    return found
+
+
+def test_the_truth_hangs_in_one_tree_with_the_odometry(bag, recording, tmp_path):
+    """With a run, both begin as one and drift apart; without one, base_link is where the truth is."""
+    links = {t.child_frame_id: (t.header.frame_id, t.transform) for t in bag["/tf_static"][0][1].transforms}
+    expected = planar_poses(poses())
+    for _, tf in bag["/tf"]:
+        links |= {t.child_frame_id: (t.header.frame_id, t.transform) for t in tf.transforms}
+        if "truth" in links:
+            assert np.linalg.norm(place(links, "truth", "odom")[:2, 3]) <= np.linalg.norm(expected[-1, :2]) + 0.1
+    assert place(links, "truth", "odom") == pytest.approx(place(links, "base_link", "odom"), abs=1e-6)
+    alone = read(export(recording, "ros2", tmp_path / "alone"))
+    links = {t.child_frame_id: (t.header.frame_id, t.transform) for t in alone["/tf"][5][1].transforms}
+    assert links["world"][0] == "base_link" and place(links, "truth", "base_link") == pytest.approx(np.eye(4), abs=1e-9)
+
+
+def test_stamps_near_zero_are_moved(recording, tmp_path):
+    """A simulator's walk begins at 0 s, which ROS takes for no stamp; a real one's stays."""
+    with Recording(recording) as source, RecordingWriter(tmp_path / "a.h5", CONFIG) as writer:
+        writer.append(source.adc(0, 3), STAMPS[:3] - STAMPS[0])
+    for later, given in ((1.7e9, None), (0.0, 0.0), (5.0, 5.0)):
+        found = read(export(tmp_path / "a.h5", "ros2", tmp_path / f"bag{later}", time_offset=given))
+        for k, (time, cloud) in enumerate(found["/radar/heatmap"]):
+            assert time == pytest.approx(later + k * CONFIG.frame_period + CONFIG.burst_center, abs=1e-6)
+            assert stamp(cloud) == pytest.approx(time, abs=1e-6)
+        assert found["/tf_static"][0][1].transforms[0].header.stamp.sec == int(later)
 
 
 def test_heat_map_is_the_pipelines(bag, recording):
@@ -196,7 +250,7 @@ def test_places_of_sensors(bag):
     found = {t.child_frame_id: (t.header.frame_id, t.transform) for t in bag["/tf_static"][0][1].transforms}
     assert {child: parent for child, (parent, _) in found.items()} == {
         "radar": "base_link", "imu": "base_link", "camera_depth_frame": "base_link",
-        "camera_depth_optical_frame": "camera_depth_frame",
+        "camera_depth_optical_frame": "camera_depth_frame", "world": "odom",
     }  # fmt: skip
     assert found["camera_depth_frame"][1].translation.z == pytest.approx(0.06)
     q = found["camera_depth_optical_frame"][1].rotation

@@ -16,7 +16,15 @@ from radarize.radar.dca1000 import encode
 RADAR, ODOMETRY, IMU = "/radar0/radar_data", "/tracking/odom/sample", "/tracking/imu"
 CLOUD, DEPTH = "/ti_mmwave/radar_scan_pcl_0", "/camera/depth/image_rect_raw/compressedDepth"
 FRAME = "xwr_raw_ros/msg/RadarFrameFull"
-#: Not what the importer falls back on: fields in another order, and more of them.
+#: The message as xwr_raw_ros defines it (github.com/ConnectedSystemsLab/xwr_raw_ros, msg/RadarFrameFull.msg), by name
+#: and type.
+PUBLISHED = [
+    ("header", "std_msgs/Header"), ("platform", "string"), ("adc_output_fmt", "uint8"), ("range_bias", "float32"),
+    ("rx_phase_bias", "float32[]"), ("chirp_time", "float32"), ("chirp_slope", "float32"), ("frame_time", "float32"),
+    ("velocity_max", "float32"), ("velocity_res", "float32"), ("sample_rate", "float32"), ("range_max", "float32"),
+    ("range_res", "float32"), ("rx", "uint8[]"), ("tx", "uint8[]"), ("shape", "uint32[]"), ("data", "int16[]"),
+]  # fmt: skip
+#: Not what the importer falls back on: fields in another order, and other ones.
 DEFINITION = """std_msgs/Header header
 string platform
 uint8 adc_output_fmt
@@ -34,12 +42,15 @@ EPOCH = 1_700_000_000.0
 
 
 class BagWriter:
-    """Writes messages of keyword fields; `version` 1 or 2 of ROS."""
+    """Writes messages of keyword fields; `version` 1 or 2 of ROS; frames by a definition of ours, or `published`."""
 
-    def __init__(self, path: Path, version: int, storage: StoragePlugin = StoragePlugin.SQLITE3):
-        self.version = version
+    def __init__(
+        self, path: Path, version: int, storage: StoragePlugin = StoragePlugin.SQLITE3, published: bool = False
+    ):
+        self.version, self.published = version, published
         self.types = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
-        self.types.register(get_types_from_msg(DEFINITION, FRAME))
+        definition = "\n".join(f"{kind} {name}" for name, kind in PUBLISHED) if published else DEFINITION
+        self.types.register(get_types_from_msg(definition, FRAME))
         self.bag = Writer1(path) if version == 1 else Writer2(path, version=8, storage_plugin=storage)
         self.connections = {}
 
@@ -77,11 +88,16 @@ class BagWriter:
         words = encode(samples[None], config)
         pairs = config.channel_factors.view(float) if calibration is None else np.asarray(calibration, float)
         loops, tx, rx, count, _ = config.frame_shape
+        others = {"max_range": 4.0, "LIMIT": 7, "shape": np.array([loops, tx * rx, count])}
+        if self.published:
+            others = {name: 0.0 for name, kind in PUBLISHED[5:] if kind == "float32"}
+            others["shape"] = np.array([loops * tx, rx, count], np.uint32)
+            pairs = pairs.astype(np.float32)
         self.write(
-            RADAR, FRAME, received, header=self.header(stamp), platform="xWR18xx", adc_output_fmt=1, max_range=4.0,
+            RADAR, FRAME, received, header=self.header(stamp), platform="xWR18xx", adc_output_fmt=1,
             range_bias=config.range_bias, rx_phase_bias=pairs.ravel(),
             rx=np.isin(np.arange(4), config.rx).astype(np.uint8), tx=np.isin(np.arange(3), config.tx).astype(np.uint8),
-            shape=np.array([loops, tx * rx, count]), data=words, LIMIT=7,
+            data=words, **others,
         )  # fmt: skip
 
     def odometry(self, time: float, pose: np.ndarray, received: float) -> None:

@@ -176,6 +176,23 @@ def test_calibration_and_sizes_come_from_the_frames(tmp_path):
         assert {"start_frequency", "idle_time"} <= set(recording.attributes["assumed"].split(", "))
 
 
+def test_bags_without_definitions_are_read(tmp_path):
+    """Of ROS 2 Humble and before: the frame's message is xwr_raw_ros's own."""
+    config = SMALL.model_copy(update={"range_bias": 0.0625})
+    with BagWriter(tmp_path / "a", 2, published=True) as bag:
+        for k, frame in enumerate(noise(config, 3)):
+            bag.frame(0.05 * k, frame, config)
+    (path,) = (tmp_path / "a").glob("*.db3")
+    with sqlite3.connect(path) as base:
+        base.execute("drop table message_definitions")
+        base.execute("update schema set schema_version = 3")
+    meta = tmp_path / "a" / "metadata.yaml"
+    meta.write_text(meta.read_text().replace("version: 8", "version: 5"))
+    given = Given(config=SMALL.model_copy(update={"channel_calibration": None}))
+    with Recording(import_recording(tmp_path / "a", tmp_path / "a.h5", given)) as recording:
+        assert np.array_equal(recording.adc(0, 3), noise(SMALL, 3)) and recording.config.range_bias == 0.0625
+
+
 def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
     """Received 30 ms after their start. Nothing said: the burst's length, 1 ms, is the least."""
     times = 0.05 * np.arange(3)

@@ -36,6 +36,27 @@ def test_samples_are_those_that_another_reader_sees(sequence, tmp_path):
         assert Rotation.from_quat(poses[-1, 3:]).as_euler("zyx") == pytest.approx([1, 0, 0])
 
 
+def test_a_sequence_without_configuration_has_the_chirps_that_its_resolutions_say(sequence, tmp_path):
+    """Slope and idle time follow from range and Doppler resolution, given the sampling rate."""
+    (sequence / "config.yaml").unlink()
+    told = {"range_resolution": RADAR.range_resolution, "doppler_resolution": RADAR.velocity_resolution}
+    (sequence / "radar/radar.json").write_text(json.dumps(told))
+    with Recording(import_recording(sequence, tmp_path / "a.h5", Given())) as recording:
+        assert recording.config.slope == pytest.approx(RADAR.slope, rel=1e-9)
+        assert recording.config.range_resolution == pytest.approx(RADAR.range_resolution)
+        assert recording.config.velocity_resolution == pytest.approx(RADAR.velocity_resolution, rel=1e-3)
+        assert "resolution" not in recording.attributes["warnings"]
+    (sequence / "radar/radar.json").write_text(json.dumps({"range_resolution": 2 * RADAR.range_resolution}))
+    given = Given(overrides={"slope": RADAR.slope})
+    with Recording(import_recording(sequence, tmp_path / "b.h5", given)) as recording:
+        assert "range_resolution is" in recording.attributes["warnings"]
+
+
+def test_times_of_the_configuration_are_whole(sequence, tmp_path):
+    with Recording(import_recording(sequence, tmp_path / "a.h5", Given())) as recording:
+        assert recording.config.idle_time == 20e-6 and recording.config.adc_start_time == 5e-6
+
+
 def test_zeros_of_frames_that_are_whole_are_no_loss(sequence, tmp_path):
     np.ones(FRAMES, np.uint8).tofile(sequence / "radar/valid")
     with Recording(import_recording(sequence, tmp_path / "a.h5", Given())) as recording:
@@ -63,6 +84,12 @@ def change_meta(folder, channel, **fields):
     (lambda f: change_meta(f, "iq", shape=[4, 5, 4, 64]), r"iq: has shape \(4, 5, 4, 64\), expected loops, 1 to 3 tx"),
     (lambda f: change_meta(f, "iq", shape=[4, "x"]), r"iq is .*, expected format, type and shape"),
     (lambda f: (f / "radar/ts").unlink(), r"ts: "),
+    (lambda f: (f / "radar/ts").write_bytes(b""), r"ts: has 0 bytes, expected 8 a frame"),
+    (lambda f: (f / "radar/radar.json").write_text("[1]"), r"radar.json: holds a list, expected an object"),
+    (lambda f: (f / "radar/radar.json").write_text('{"range_resolution": "x"}'),
+     r"range_resolution is x, expected a positive number"),
+    (lambda f: (f / "radar/radar.json").write_text('{"tx_order": [1, 2]}'),
+     r"tx_order is \[1, 2\], expected \[1, 2, 3\]"),
     (lambda f: (f / "radar/iq").write_bytes(b"12"), r"iq: has 2 bytes, expected \d+ a frame"),
     (lambda f: (f / "config.yaml").write_text("radar: {args: {}}"), r"config.yaml: has no radar: args: radar:"),
     (lambda f: chirps(f / "config.yaml", CHIRPS | {"freq_slope": "x"}),

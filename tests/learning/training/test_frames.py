@@ -75,6 +75,54 @@ def test_samples_and_stored_maps_read_the_same(folder, maps_folder):
             assert (values - stored[index][name]).abs().max() <= (STEP if name in MAPS else 0)
 
 
+def test_recordings_by_name(folder):
+    one, two = FrameDataset(folder / "b.h5"), FrameDataset([folder / "b.h5", folder / "c.h5"])
+    assert [path.stem for path in one.paths] == ["b"] and len(two) == 2 * len(one)
+    assert torch.equal(one[3]["velocity"], FrameDataset(folder)[len(one) + 3]["velocity"])
+    with pytest.raises(InputError, match="split is 'random-0', but single recordings are named"):
+        FrameDataset(folder / "b.h5", "random-0")
+
+
+def test_time_is_exact(tmp_path):
+    """Of stamps since 1970, float32 has steps of two minutes."""
+    path = walk(tmp_path / "a.h5", start=1.7e9)
+    item = FrameDataset(path, fields=("time", "velocity"), window=4)[2]
+    with Recording(path) as recording:
+        assert item["time"].dtype == torch.float64 and item["velocity"].dtype == torch.float32
+        assert np.array_equal(item["time"].numpy(), recording.times[2:6])
+
+
+def test_cached_maps_are_made_once_and_the_same(folder, monkeypatch):
+    from radarize.learning.training import dataset
+
+    cached, fresh = (FrameDataset(folder, window=3, spacing=2, cache=kept) for kept in (True, False))
+    made, maps_of = [], dataset.maps_of
+    monkeypatch.setattr(dataset, "maps_of", lambda *arguments: made.append(arguments[1]) or maps_of(*arguments))
+    found = [cached[index] for index in (0, 2, 0)]
+    assert made == [0, 2, 4, 6]  # the windows 0, 2, 4 and 2, 4, 6
+    for item, index in zip(found, (0, 2, 0), strict=True):
+        assert all(torch.equal(values, fresh[index][name]) for name, values in item.items())
+
+
+def test_one_definition_of_a_map(folder):
+    """What the data set, the networks and `rz.doppler_azimuth` call a Doppler-azimuth map is one, axes included."""
+    import radarize as rz
+    from radarize.signal.maps import AZIMUTHS, FLOOR
+
+    frames = rz.torch_dataset(folder / "a.h5", features=["doppler_azimuth", "range_azimuth"])
+    source = rz.load(folder / "a.h5")
+    doppler = rz.doppler_azimuth(source[4], method="capon", azimuths=AZIMUTHS, limited=True)
+    ranges = rz.range_azimuth(source[4], method="capon", azimuths=AZIMUTHS)
+    for name, power in (("doppler_azimuth", doppler), ("range_azimuth", ranges)):
+        decibels = 10 * np.log10(np.maximum(power.values, 10 ** (FLOOR / 10)))
+        assert np.abs(frames[4][name][0].numpy() - decibels).max() <= STEP / 2 + 1e-3
+        axes = frames.axes[name]
+        rows = axes.step * (np.arange(axes.rows) - (axes.rows // 2 if axes.centred else 0))
+        offset = CONFIG.range_bias if name == "range_azimuth" else 0
+        assert power[power.dims[0]].values == pytest.approx(rows - offset)
+        assert power.azimuth.values == pytest.approx(axes.azimuths)
+
+
 def test_splits(folder):
     assert [path.stem for path in FrameDataset(folder, "random-0").paths] == ["a", "b"]
     assert [path.stem for path in FrameDataset(folder, "random-0", "test").paths] == ["c"]
@@ -127,7 +175,7 @@ def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
 
 def test_the_example_of_the_readme_trains(folder, monkeypatch, capsys):
     """As printed, on these recordings: the loss falls."""
-    code = next(c for c in re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), re.S) if "FrameDataset(" in c)
+    code = next(c for c in re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), re.S) if "torch_dataset(" in c)
     assert len([line for line in code.splitlines() if line.strip()]) <= 12
     torch.manual_seed(0)
     exec(compile(code.replace('"small"', repr(str(folder))), HOW_TO.name, "exec"), {})

@@ -12,14 +12,14 @@ TURN = 0.05  # rad a frame
 VELOCITY = (0.5, -0.2, 0.1)
 
 
-def walk(path: Path, frames: int = 12, truth: bool = True, seed: int = 0) -> Path:
+def walk(path: Path, frames: int = 12, truth: bool = True, seed: int = 0, start: float = 0.0) -> Path:
     """A recording whose velocity and turn rate are constant."""
     rng = np.random.default_rng(seed)
     n = np.arange(CONFIG.samples)
     echo = 500 * np.exp(2j * np.pi * 20 / CONFIG.samples * n) + 50 * np.exp(2j * np.pi * 50 / CONFIG.samples * n)
     noise = rng.normal(0, 20, (frames, *CONFIG.frame_shape))
     adc = np.rint(noise + np.stack([echo.real, echo.imag], axis=-1)).astype(np.int16)
-    times = np.arange(frames) * CONFIG.frame_period
+    times = start + np.arange(frames) * CONFIG.frame_period
     yaw = 3.0 + TURN * np.arange(frames)  # passes pi
     zero = np.zeros(frames)
     rows = {
@@ -34,6 +34,6 @@ def walk(path: Path, frames: int = 12, truth: bool = True, seed: int = 0) -> Pat
         path, CONFIG, attributes={"seed": seed}, streams=streams if truth else {}, products=products
     ) as writer:
         if truth:
-            writer.extend("imu/time", np.arange(0, frames * CONFIG.frame_period, 0.005))
+            writer.extend("imu/time", start + np.arange(0, frames * CONFIG.frame_period, 0.005))
         writer.append(adc, times, rows=rows if truth else {})
     return path

@@ -7,7 +7,7 @@ from isal.igzip_lib import IsalError
 from jaxtyping import Bool, Shaped
 
 #: What h5py and isal raise of damaged chunks.
-_UNREADABLE = OSError, RuntimeError, ValueError, IsalError
+_UNREADABLE: tuple[type[Exception], ...] = OSError, RuntimeError, ValueError, IsalError  # type: ignore[assignment]
 _UNKNOWN, _WHOLE, _DAMAGED = range(3)
 
 

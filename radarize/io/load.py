@@ -114,7 +114,7 @@ def load(
     if settings.capture is None and len(several := captures(path, settings)) > 1:
         listed = "; ".join(several)
         raise InputError(
-            f"{path}: holds {len(several)} captures ({listed}), expected capture, 1 to {len(several)}, or an output file"
+            f"{path}: holds {len(several)} captures ({listed}), expected capture, 1 to {len(several)}, or an output"
         )
     return in_temporary_file(lambda to: import_recording(path, to, settings, report), f"{path.stem}.h5")
 

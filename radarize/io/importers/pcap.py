@@ -13,7 +13,7 @@ import dpkt
 import numpy as np
 
 from radarize.io.errors import InputError, explained
-from radarize.io.importers.bin import configured
+from radarize.io.importers.bin import configured, other_period
 from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.datagrams import Datagram, Start, by_start, datagram, starts
 from radarize.io.importers.format import Format
@@ -86,6 +86,8 @@ def _batches(path: Path, capture: Capture, start: Start | None) -> Iterator[Capt
                 f"{path}: lacks more than {most_lost} bytes between its data packets, {_MOST_LOST} times its size; "
                 "expected byte counts that grow as packets come"
             )
+        if not yielded and not frames:
+            capture.warnings += _misfit(frame[0], capture.config)
         frames.append(frame)
         if len(frames) >= size:
             yielded += len(frames)
@@ -99,6 +101,17 @@ def _batches(path: Path, capture: Capture, start: Start | None) -> Iterator[Capt
     capture.warnings += assembler.counts.warnings()
     if frames:
         yield _stack(frames, capture.config)
+
+
+def _misfit(words: np.ndarray, config: RadarConfig) -> list[str]:
+    """A warning if a frame's samples plainly repeat otherwise than configured, as with too few transmitters."""
+    if (period := other_period(words.tobytes(), config)) is None:
+        return []
+    loop = config.frame_bytes // 4 // config.loops
+    return [
+        f"samples repeat every {period} and not every {loop} (TX x RX x samples), expected the configuration of this "
+        "capture: --tx says how many transmitters there are"
+    ]
 
 
 def _frames(

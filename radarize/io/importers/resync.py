@@ -146,7 +146,7 @@ class Judge:
         return found
 
     def _end_whole(self, found: Pieces) -> None:
-        """A capture ends with a whole frame: where whole loops, or nearly, are missing there, the gap is so much longer."""
+        """A capture ends with a whole frame: where whole loops, or nearly, are missing, the gap is longer."""
         rest = -found.size % self._config.frame_bytes
         nearly = (rest + _APART) % self._loop - _APART
         if abs(nearly) > _APART or nearly % _GROUP:

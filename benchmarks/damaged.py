@@ -321,10 +321,10 @@ def main(options: argparse.Namespace) -> Page:
         data=Data("one simulated walk of 210 frames (office, cart)", (), 1),
         notes=[
             "Kinds: 1 a frame that cannot be unpacked; 2 a `.part`, and stamps; 3 several captures in one; 4 bytes "
-            "missing in raw words; 6 headers and transmitters; 7 surroundings. Kind 5, what is wrong without a word, is "
-            "the business of `radarize check`.",
-            "Before: at commit 5718bfa, by this script. Frames: of all recordings that are there afterwards; 210 went "
-            "into each case, but 110, 100, 100, 50 and 50 into the network captures, 60 into --tx 1, 100 into the bags.",
+            "missing in raw words; 6 headers and transmitters; 7 surroundings. Kind 5, what is wrong without a "
+            "word, is the business of `radarize check`.",
+            "Before: at commit 5718bfa, by this script. Frames: of all recordings that are there afterwards. 210 went "
+            "into each case; but 110, 100, 100, 50 and 50 into the network captures, 60 into --tx 1, 100 into bags.",
             "A deleted working folder, full shared memory and an early Ctrl-C are tried in "
             "`tests/io/test_surroundings.py`.",
             surroundings(),

@@ -26,6 +26,8 @@ from radarize.radar.presets import load_config
 _LOOKED_AT, _PERIODS = 1 << 20, 1 << 21
 #: Times the configuration's loop that the samples' may be long: of three transmitters, where one is configured.
 _LONGEST = 3
+#: Share of the best correlation that a period has whose multiple is the best.
+_AS_GOOD = 0.9
 _PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
 
 
@@ -173,12 +175,12 @@ def other_period(data: bytes, config: RadarConfig) -> int | None:
     spectrum = np.fft.fft(signal, 2 * len(signal))
     correlation = np.abs(np.fft.ifft(np.abs(spectrum) ** 2)[: longest + 1])
     correlation *= len(signal) / (len(signal) - np.arange(longest + 1)) / correlation[0]
-    for most in range(2, _LONGEST + 1):  # the shortest: its multiples are as good
-        candidates = np.arange(loop // 2 & ~1, min(most * loop, longest) + 1, 2)
-        best = int(candidates[np.argmax(correlation[candidates])])
-        if correlation[best] > 0.7 and correlation[loop] < 0.5 * correlation[best]:
-            return best
-    return None
+    candidates = np.arange(loop // 2 & ~1, longest + 1, 2)
+    best = int(candidates[np.argmax(correlation[candidates])])
+    if correlation[best] < 0.7 or correlation[loop] > 0.5 * correlation[best]:
+        return None
+    parts = [best // count for count in (4, 3, 2) if best % (2 * count) == 0]  # a multiple of the period is as good
+    return next((part for part in parts if correlation[part] > _AS_GOOD * correlation[best]), best)
 
 
 def configured(source: Path, given: Given) -> Given:

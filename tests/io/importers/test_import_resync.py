@@ -37,7 +37,7 @@ def imported(tmp_path, data, config=CONFIG):
 
 
 @pytest.mark.parametrize("missing", [1, 7, 1456, 2912, LOOP // 3, 5 * 1456 + 3, 2 * LOOP + 500])
-@pytest.mark.parametrize("place", [0.31, 0.52, 0.777])
+@pytest.mark.parametrize("place", [0.31, 0.53, 0.777])
 def test_what_follows_missing_bytes_is_moved_to_where_it_belongs(tmp_path, missing, place):
     at = int(place * len(DATA))
     with imported(tmp_path, DATA[:at] + DATA[at + missing :]) as recording:

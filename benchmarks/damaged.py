@@ -261,14 +261,24 @@ def _no_utf8(folder: Path) -> list[str]:
 
 
 # --- what came of them ------------------------------------------------------------------------------------------------
+def invoked(words: list[str]) -> tuple[int, str]:
+    """Exit code and words of a command; in a process of its own where a name is no UTF-8, as a terminal prints it."""
+    if any("\udcff" in word for word in words):
+        command = [sys.executable, "-m", "radarize.cli", *words]
+        ended = subprocess.run(command, capture_output=True, text=True, errors="backslashreplace")
+        return ended.returncode, ended.stdout if ended.returncode == 0 else ended.stderr
+    commands = radarsim if words[0] == "radarsim" else app
+    done = CliRunner().invoke(commands, words[words[0] == "radarsim" :])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        return 2, str(done.exception)
+    return done.exit_code, done.stderr or done.stdout
+
+
 def outcome(name: str, folder: Path) -> dict[str, object]:
     """A row of the table: what a command did with a case's files."""
     kind, make = CASES[name]
     words = make(folder)
-    commands = radarsim if words[0] == "radarsim" else app
-    done = CliRunner().invoke(commands, words[words[0] == "radarsim" :])
-    error = "" if done.exception is None or isinstance(done.exception, SystemExit) else f"{done.exception}"
-    told = error or done.stderr or done.stdout
+    code, told = invoked(words)
     marks = (
         "damaged",
         "cannot be unpacked",
@@ -297,7 +307,7 @@ def outcome(name: str, folder: Path) -> dict[str, object]:
         "kind": kind,
         "case": name,
         "before": _BEFORE.get(name, "-"),
-        "exit code": 2 if error else done.exit_code,
+        "exit code": code,
         "frames": frames,
         "chirps lost": lost,
         "now": shown if len(shown) <= _SHOWN else shown[:_SHOWN] + " ...",

@@ -39,6 +39,17 @@ def warn(warnings: list[str]) -> None:
         typer.echo(f"warning: {words}", err=True)
 
 
+def damage(source: Path) -> list[str]:
+    """Sentences on what of a recording is damaged, once all its samples have been unpacked; none of a run's folder."""
+    from radarize.io.load import load
+
+    if source.is_dir():
+        return []
+    with load(source) as recording:
+        recording.valid(0, len(recording))
+        return recording.damage
+
+
 def tell(written: Path) -> None:
     """How many frames a new recording has, and what its attributes warn of."""
     from radarize.io.recording import Recording

@@ -53,6 +53,10 @@ def import_(
     imu_turn: Annotated[
         str | None, typer.Option(metavar="'ROLL PITCH YAW'", help="Of a bag's IMU on the radar, degrees.")
     ] = None,
+    capture: Annotated[
+        int | None,
+        typer.Option(help="Which capture of a .pcap with several (boards, ports, starts of the radar); else all."),
+    ] = None,
     walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     align: Annotated[
         bool, typer.Option("--align", help="Of a walk: the lidar's pictures of the same instants, not numbers.")

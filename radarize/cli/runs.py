@@ -12,6 +12,7 @@ from radarize.cli.app import (
     RecordingFile,
     RunPath,
     app,
+    damage,
     names,
     warn,
 )
@@ -135,6 +136,7 @@ def export(
     """Write a recording or a run for other programs."""
     from radarize.io.exporters import export
 
+    warn(damage(source))
     with progress("export") as report:
         written = export(source, format, output, run=run, iq_order=iq_order, time_offset=time_offset, progress=report)
     print(written)
@@ -165,6 +167,7 @@ def view(
 ) -> None:
     """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and path types on one time line."""
     written: Path | None
+    warn(damage(source))
     with progress("view") as report:
         if save is not None and save.suffix == ".mcap":
             from radarize.evaluation.mcap import write_mcap

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import TextIOWrapper
 from types import FrameType
 from typing import Annotated, Any
 
@@ -56,7 +57,10 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
             os.environ[variable] = "1"  # for jobs, too, wherever they are done
     arguments = [argument for argument in arguments if argument not in _EVERYWHERE]
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a request to terminate ends it as Ctrl-C does
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape")  # names of files are bytes, which need not be UTF-8
     try:
+        _refuse_lost_folder()
         code = typer.main.get_command(app).main(arguments, prog_name=name, standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:
         if debug:
@@ -67,6 +71,18 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
         print(f"\n{name}: stopped; nothing was written", file=sys.stderr)
         code = FAILED
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse_lost_folder() -> None:
+    """Refuse a working folder that was deleted: libraries in C end the process there, without a word.
+
+    Raises:
+        InputError: it is not there.
+    """
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise InputError("the working folder was deleted, expected one that is there: cd to another") from None
 
 
 def _sentence(error: BaseException) -> str:

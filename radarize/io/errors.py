@@ -1,7 +1,9 @@
 """The one exception that users meet."""
 
 import errno
+import os
 import re
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
@@ -9,6 +11,8 @@ from contextlib import contextmanager
 DEBUG = "RADARIZE_DEBUG"
 #: What `reason` says of a full disk, whoever found it.
 FULL = "no space left on the device"
+#: Where processes exchange data (Linux), and bytes below which it is full.
+SHARED_MEMORY, _SHARED = "/dev/shm", 1 << 20
 #: Characters of a sentence that somebody reads.
 _LONGEST = 1000
 
@@ -43,7 +47,10 @@ class DiskFull(InputError):
 
 
 def of_system(error: OSError) -> str:
-    """What the system says, and of which file."""
+    """What the system says, and of which file; shared memory, in which nobody named a file, if that is full."""
+    if not error.filename and error.errno == errno.ENOSPC and os.path.isdir(SHARED_MEMORY):
+        if shutil.disk_usage(SHARED_MEMORY).free < _SHARED:
+            return f"{SHARED_MEMORY}: {FULL}, expected room for what processes exchange: free some of it"
     return f"{error.filename}: {reason(error)}" if error.filename else reason(error)
 
 

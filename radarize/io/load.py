@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, TypedDict, Unpack, cast
 import numpy as np
 
 from radarize.io.errors import InputError, refuse_unknown
-from radarize.io.importers import Given, import_recording
+from radarize.io.importers import Given, captures, import_recording
 from radarize.io.recording import Clip, Recording, in_temporary_file
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
@@ -47,6 +47,7 @@ class CaptureOptions(TypedDict, total=False):
     latency: float | None
     imu_turn: str | tuple[float, float, float] | None
     walk: int | None
+    capture: int | None
     align: bool
     samples: int | None
     loops: int | None
@@ -110,6 +111,11 @@ def load(
     settings, report = _settings(given), progress or (lambda done, total: None)
     if output is not None:
         return Recording(import_recording(path, Path(output), settings, report))
+    if settings.capture is None and len(several := captures(path, settings)) > 1:
+        listed = "; ".join(several)
+        raise InputError(
+            f"{path}: holds {len(several)} captures ({listed}), expected capture, 1 to {len(several)}, or an output"
+        )
     return in_temporary_file(lambda to: import_recording(path, to, settings, report), f"{path.stem}.h5")
 
 

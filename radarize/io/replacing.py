@@ -106,11 +106,12 @@ class Replacement:
 
 
 def write_whole(path: Path, text: str) -> Path:
-    """Write a text file under a temporary name and rename it when it is whole.
+    """Write a text file under a temporary name and rename it when it is whole. Bytes of file names that are no UTF-8
+    stand in it as ``\\udcff``.
 
     Raises:
         InputError: it cannot be written.
     """
     with replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8", errors="backslashreplace")
     return path

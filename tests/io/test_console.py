@@ -112,8 +112,8 @@ def test_the_doctor_cuts_no_path(printed, monkeypatch):
 
 def test_attributes_written_as_json_break_between_figures(terminal, capsys):
     figures = [round(-1000.25 - k, 2) for k in range(100)]
-    found = {"path": "walk.h5", "frames": 0, "duration": 0.0, "lost_chirps": 0, "lost_share": 0.0, "effort": "",
-             "config": {}, "derived": {}, "data_sets": {}}  # fmt: skip
+    found = {"path": "walk.h5", "frames": 0, "duration": 0.0, "lost_chirps": 0, "lost_share": 0.0, "damage": [],
+             "effort": "", "config": {}, "derived": {}, "data_sets": {}}  # fmt: skip
     show(found | {"attributes": {"front_end": json.dumps({"dbc_hz": figures}, separators=(",", ":"))}})
     out = capsys.readouterr().out
     assert {f"{figure}," for figure in figures[1:-1]} <= set(out.split()) and max(map(len, out.splitlines())) <= 80

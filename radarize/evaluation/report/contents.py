@@ -29,12 +29,13 @@ DERIVED = {
 
 
 def contents(path: Path) -> dict[str, Any]:
-    """Everything about a recording but its samples, as JSON-ready data.
+    """Everything about a recording but its samples, as JSON-ready data. All samples are unpacked to see that they can.
 
     Returns:
-        ``path``, ``frames``, ``duration`` (s), ``lost_chirps`` (count) and ``lost_share``, ``effort`` (a sentence where
-        frames are much larger than the preset's), ``config``, ``derived``
-        (name to value, units as in `DERIVED`), ``data_sets`` (path to shape, dtype, unit, about), ``attributes``.
+        ``path``, ``frames``, ``duration`` (s), ``lost_chirps`` (count) and ``lost_share``, ``damage`` (sentences, see
+        `Recording.damage`), ``effort`` (a sentence where frames are much larger than the preset's), ``config``,
+        ``derived`` (name to value, units as in `DERIVED`), ``data_sets`` (path to shape, dtype, unit, about),
+        ``attributes``.
 
     Raises:
         InputError: not a recording, or a damaged one.
@@ -49,6 +50,7 @@ def contents(path: Path) -> dict[str, Any]:
             "start_time": float(times[0]) if len(times) else None,
             "lost_chirps": int(np.size(valid) - np.count_nonzero(valid)),
             "lost_share": float(1 - np.mean(valid)) if np.size(valid) else 0.0,
+            "damage": recording.damage,
             "effort": effort(config, len(recording)) if recording.has_samples else "",
             "config": recording.config.model_dump(mode="json"),
             "derived": {name: float(getattr(config, name)) for name in DERIVED},
@@ -90,8 +92,9 @@ def show(found: dict) -> None:
         f"{printable(found['path'])}: {found['frames']} frames, {found['duration']:.2f} s, "
         f"{found['lost_chirps']} chirps lost ({100 * found['lost_share']:.2f} %)"
     )
-    if found["effort"]:
-        print(found["effort"])
+    for words in (*found["damage"], found["effort"]):
+        if words:
+            print(words)
     config = dict(found["config"])
     config["channel_calibration"] = config.get("channel_calibration") or "nominal"
     if isinstance(config.get("board"), dict):

@@ -56,6 +56,8 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
                 (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
             ]
         )
+        for words in found["damage"]:
+            page.text(f"{words[:1].upper()}{words[1:]}.")
         shown = np.unique(np.linspace(0, len(recording) - 1, _FRAMES).astype(int))
         if polar.pictured(recording):
             _pictures(page, recording, shown)

@@ -5,7 +5,8 @@ the same for all: settle the order of I and Q, stamp the frames, write the recor
 entry points of the group ``radarize.importers``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from radarize.io.errors import InputError
 from radarize.io.files import regular
+from radarize.io.hdf5 import open_hdf5
 from radarize.io.importers.capture import Capture, CapturedFrames
 from radarize.io.importers.format import FORMATS, Format
 from radarize.io.importers.parameters import Given
@@ -23,7 +25,7 @@ from radarize.radar.cfg import assumed_board, remarks
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import range_balance
 
-__all__ = ["Given", "import_recording"]
+__all__ = ["Given", "captures", "import_recording"]
 
 #: From this many dB on, the samples themselves say which of I and Q comes first.
 _CERTAIN_DB = 10.0
@@ -50,7 +52,8 @@ def import_recording(
             lie beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an
             array of samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or RadarHD's data set of
             pictures, of which ``given.walk`` is taken.
-        output: recording to write.
+        output: recording to write; of a network capture with several starts of the radar, boards or ports, each is
+            written, the second to ``NAME-2.h5``, unless ``given.capture`` says which.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
 
@@ -64,6 +67,8 @@ def import_recording(
         raise InputError(f"{output}: is the source itself, expected another output file")
     products = _poses(given.poses) if given.poses else {}
     format = _format(source, given)
+    if given.capture is None and len(several := format.captures(source) if format.captures else ()) > 1:
+        return _import_all(source, output, given, len(several), progress)
     if format.write:
         return format.write(source, output, given, products, progress)
     assert format.open is not None  # a format has one or the other
@@ -113,6 +118,45 @@ def _of_the_radar(capture: Capture, given: Given) -> list[str]:
         return losses(capture.config)
     unsaid = not capture.cfg_text and given.config is None and not capture.board_known
     return [*([assumed_board(capture.config)] if unsaid else []), *remarks(capture.cfg_text, capture.config)]
+
+
+def captures(source: Path, given: Given) -> Sequence[str]:
+    """What captures a source holds, in words; none where its format holds one alone.
+
+    Raises:
+        InputError: unknown format.
+    """
+    format = _format(source, given)
+    return format.captures(source) if format.captures else ()
+
+
+def _import_all(source: Path, output: Path, given: Given, count: int, progress: Callable[[int, int], None]) -> Path:
+    """Write a recording of each capture that a source holds; of the second one into ``NAME-2.h5``. Returns the first.
+
+    Raises:
+        InputError: one of the files is there, but for the first; or no capture can be read.
+    """
+    outputs = [output, *(output.with_stem(f"{output.stem}-{number}") for number in range(2, count + 1))]
+    for number, path in enumerate(outputs[1:], 2):
+        if path.exists():
+            raise InputError(
+                f"{path}: is there already, and capture {number} of {count} in {source} would go there, expected "
+                f"another output, or capture, 1 to {count}"
+            )
+    written, told = [], []
+    for number, path in enumerate(outputs, 1):
+        try:
+            written.append(import_recording(source, path, replace(given, capture=number), progress))
+            told.append(f"capture {number} is in {path}")
+        except InputError as error:
+            failed = error
+            told.append(f"capture {number} is left out ({error})")
+    if not written:
+        raise failed
+    for path in written:
+        with open_hdf5(path, mode="r+") as file:
+            file.attrs["warnings"] = "; ".join([*filter(None, [str(file.attrs.get("warnings", ""))]), *told])
+    return written[0]
 
 
 def _poses(path: Path) -> dict[str, Product]:

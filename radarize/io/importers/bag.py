@@ -218,7 +218,7 @@ def _batches(
         raise InputError(
             f"{path}: {'; '.join(frames.warnings)}; expected {' x '.join(map(str, config.frame_shape))} words a frame"
         )
-    capture.warnings += frames.warnings
+    capture.warnings += [*frames.warnings, *stamps.warnings]
     for topic, companion in companions.items():
         if companion.damaged:
             capture.warnings.append(f"{topic}: {companion.damaged} messages could not be used")

@@ -11,18 +11,23 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Int16
 
-from radarize.io.errors import InputError, explained
+from radarize.io.errors import InputError
 from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
 from radarize.io.importers.layout import arranged, likely, recorded
 from radarize.io.importers.parameters import Given
+from radarize.io.importers.resync import Judge, Pieces, read_range
 from radarize.io.importers.words import oddity, signed
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout
 from radarize.radar.presets import load_config
 
 #: Bytes by which a capture is judged.
-_LOOKED_AT = 1 << 20
+_LOOKED_AT, _PERIODS = 1 << 20, 1 << 21
+#: Times the configuration's loop that the samples' may be long: of three transmitters, where one is configured.
+_LONGEST = 3
+#: Share of the best correlation that a period has whose multiple is the best.
+_AS_GOOD = 0.9
 _PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
 
 
@@ -74,9 +79,11 @@ def open_bin(
     Args:
         encoding, layout: of their words, see `radarize.io.importers.words` and `radarize.io.importers.layout`.
 
-    An incomplete last frame is left out with a warning, unless the samples show that it is the configuration which
-    does not fit; of words that are plainly something else than `encoding` says there is a warning, too. Chirps of
-    nothing but zeros count as lost: capture programs fill lost packets with zeros.
+    Where bytes are missing, what follows is moved to where it belongs; from where on frames have another size, all is
+    left out, each with a warning (`radarize.io.importers.resync`). An incomplete last frame is left out with a warning,
+    unless the samples show that it is the configuration which does not fit; of words that are plainly something else
+    than `encoding` says there is a warning, too. Chirps of nothing but zeros count as lost: capture programs fill lost
+    packets with zeros.
 
     Raises:
         InputError: less than one frame, or the samples repeat with another period than the configuration's loop.
@@ -94,11 +101,12 @@ def open_bin(
     with files[0].open("rb") as file:
         begins = file.read(_LOOKED_AT)
     words = signed(np.frombuffer(begins, "<i2", len(begins) // 2), encoding)
+    pieces = Pieces([(range(size), 0)])
     if odd := oddity(begins, encoding):
         warnings.append(f"{name}: {odd}")
     elif (other := likely(words, told, layout)) != layout:
         warnings.append(f"{name}: its words look {other}, not {layout}; --layout {other} reads those")
-    elif layout == "pairs" and (period := _other_period(files[0], config)):
+    elif layout == "pairs" and (period := other_period(read_range(files, 0, _PERIODS), config)):
         expected = tx * rx * samples
         message = (
             f"{name}: has {size} bytes, {whole} frames and {rest} bytes of {each}, but its samples repeat every "
@@ -107,52 +115,61 @@ def open_bin(
         if rest:
             raise InputError(message)
         warnings.append(message)
-    elif rest:
-        warnings.append(
-            f"{name}: has {size} bytes, {whole} whole frames and {rest} bytes of an incomplete one, which is left out; "
-            f"expected {each}"
-        )
+    else:
+        if layout == "pairs" and encoding == "signed":
+            pieces, period = _judged(files, size, config)
+            warnings += pieces.warnings(name)
+            whole, rest = divmod(pieces.size, config.frame_bytes)
+            if pieces.ends is not None:
+                warnings.append(
+                    f"{name}: from byte {pieces.ends} on, samples repeat every {period} and not every "
+                    f"{tx * rx * samples} as before; {size - pieces.ends} bytes are left out, expected frames of a size"
+                )
+        if rest:
+            warnings.append(
+                f"{name}: has {size} bytes, {whole} whole frames and {rest} bytes of an incomplete one, which is left "
+                f"out; expected {each}"
+            )
     read = partial(arranged, config=config, layout=layout)
-    return Capture(config, cfg_text, _batches(files, config, encoding, read), whole, assumed, warnings)
+    return Capture(config, cfg_text, _batches(files, pieces, config, encoding, read), whole, assumed, warnings)
 
 
 def _batches(
-    files: Sequence[Path], config: RadarConfig, encoding: str, read: Callable[[np.ndarray], np.ndarray]
+    files: Sequence[Path],
+    pieces: Pieces,
+    config: RadarConfig,
+    encoding: str,
+    read: Callable[[np.ndarray], np.ndarray],
 ) -> Iterator[CapturedFrames]:
-    for data in _blocks(files, batch_frames(config) * config.frame_bytes):
+    for data in pieces.blocks(partial(read_range, files), batch_frames(config) * config.frame_bytes):
         words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
         words = words.astype(np.int16, copy=False)
         if words.size:
             yield CapturedFrames(read(signed(words, encoding)), ~all_zero(words, config))
 
 
-def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:
-    """Content of the files put end to end, in blocks of `size` bytes; the last one may be shorter."""
-    block = b""
-    for path in files:
-        with explained(f"{path}: cannot be read", OSError), path.open("rb") as file:
-            while data := file.read(size - len(block)):
-                block += data
-                if len(block) == size:
-                    yield block
-                    block = b""
-    yield block
+def _judged(files: Sequence[Path], size: int, config: RadarConfig) -> tuple[Pieces, int | None]:
+    """Pieces of a capture, and the period of its samples from where they end, if they end early."""
+
+    def period(start: int) -> int | None:
+        return other_period(read_range(files, start, start + _PERIODS), config)
+
+    pieces = Judge(partial(read_range, files), size, config, period).pieces()
+    return pieces, None if pieces.ends is None else period(pieces.ends)
 
 
-def _other_period(path: Path, config: RadarConfig) -> int | None:
+def other_period(data: bytes, config: RadarConfig) -> int | None:
     """Complex samples after which the capture repeats, if that is clearly not the configuration's loop.
 
     Chirps of one transmitter and receiver look alike from loop to loop, so the magnitude of the autocorrelation peaks
     at the loop's length. None where the peak is there, or nowhere distinct.
     """
     loop = config.frame_bytes // 4 // config.loops
-    with path.open("rb") as file:
-        data = file.read(1 << 21)
     words = np.frombuffer(data, "<i2", len(data) // 8 * 4)
     pairs = words.reshape(-1, 2, 2).astype(np.float32)  # either order of I and Q: the other is its mirror image
     signal = (pairs[:, 0] + 1j * pairs[:, 1]).reshape(-1)
     signal -= signal.mean()
-    longest = min(2 * loop, len(signal) // 2)
+    longest = min(_LONGEST * loop, len(signal) // 2)
     if loop > longest or not signal.any():
         return None
     spectrum = np.fft.fft(signal, 2 * len(signal))
@@ -160,7 +177,10 @@ def _other_period(path: Path, config: RadarConfig) -> int | None:
     correlation *= len(signal) / (len(signal) - np.arange(longest + 1)) / correlation[0]
     candidates = np.arange(loop // 2 & ~1, longest + 1, 2)
     best = int(candidates[np.argmax(correlation[candidates])])
-    return best if correlation[best] > 0.7 and correlation[loop] < 0.5 * correlation[best] else None
+    if correlation[best] < 0.7 or correlation[loop] > 0.5 * correlation[best]:
+        return None
+    parts = [best // count for count in (4, 3, 2) if best % (2 * count) == 0]  # a multiple of the period is as good
+    return next((part for part in parts if correlation[part] > _AS_GOOD * correlation[best]), best)
 
 
 def configured(source: Path, given: Given) -> Given:

@@ -1,6 +1,6 @@
 """What a format to read is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ class Format:
         write: writes the recording of a format without samples (such as one of pictures): source, output, what the user
             says, further data sets, progress. None of a format with samples.
         options: fields of `Given` that belong to this format and some others only.
+        captures: what captures a source holds, in words, where it may hold several, of which `Given.capture` is one.
         last: asked after all other formats, such as one of any folder.
     """
 
@@ -35,6 +36,7 @@ class Format:
     write: Callable[[Path, Path, Given, Mapping[str, Product], Progress], Path] | None = None
     options: tuple[str, ...] = ()
     last: bool = False
+    captures: Callable[[Path], Sequence[str]] | None = None
 
 
 FORMATS: Plugins[Format] = Plugins("radarize.importers", "format")

@@ -9,6 +9,8 @@ Receipts are late by what the computer did meanwhile; the radar's timer is perio
 below them.
 """
 
+from collections import deque
+
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d
@@ -21,6 +23,8 @@ from radarize.radar.config import RadarConfig
 #: s that a computer may hold frames up, parts of a recording whose least late frames make the line, and share by which
 #: receipts may be apart otherwise than configured.
 _HELD_UP, _PARTS, _AGREE = 2.0, 32, 0.01
+#: Frame periods by which a header may be ahead of all before it, measured by its receipt; and how many before it count.
+_EARLY, _BEFORE = 1.5, 64
 
 
 class Stamps:
@@ -34,20 +38,40 @@ class Stamps:
     Attributes:
         latency: from a frame's start to its receipt, s; None where headers say.
         assumed: what nobody said.
+        distrusted: headers so far that are ahead of their time.
     """
 
     def __init__(self, config: RadarConfig, first: object, received: Float[np.ndarray, "frame"], latency: float | None):
         from_headers = latency is None and abs(header_time(first) - received[0]) < SAME_CLOCK
         self.assumed = ("latency",) if latency is None and not from_headers else ()
         self.latency = None if from_headers else config.burst_time if latency is None else latency
+        self.distrusted, self._period, self._last = 0, config.frame_period, -np.inf
+        self._ahead: deque[float] = deque(maxlen=_BEFORE)  # s, of headers, of their receipt
         self._received = np.unique(received)
         self._periodic = self._received if from_headers else periodic(self._received, config.frame_period)
 
     def __call__(self, message: Message, received: float) -> float:
         """Of a frame, s."""
         if self.latency is None:
-            return header_time(message)
+            self._last = self._trusted(header_time(message), received)
+            return self._last
         return float(self._periodic[np.searchsorted(self._received, received)]) - self.latency
+
+    def _trusted(self, header: float, received: float) -> float:
+        """A header's stamp, or what its receipt says if it is ahead: no frame is received before it begins."""
+        ahead = header - received
+        if self._ahead and ahead > max(self._ahead) + _EARLY * self._period:
+            self.distrusted += 1
+            since = received + float(np.median(self._ahead)) - self._last
+            return self._last + self._period * max(1, round(since / self._period))
+        self._ahead.append(ahead)
+        return header
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was wrong with headers, in a sentence."""
+        what = "frames have a header ahead of their receipt, and are stamped by the frame period instead"
+        return [f"{self.distrusted} {what}"] if self.distrusted else []
 
     def __str__(self) -> str:
         if self.latency is None:

@@ -48,6 +48,7 @@ class Given:
         walk: number of a walk in a data set of pictures.
         align: take, as truth of a walk's frame, the lidar's picture of the same instant, not of the same number.
         encoding: of a .bin's words, ``signed`` or ``offset-binary``.
+        capture: which of several captures in a network capture, from 1.
         layout: of a .bin's words, see `radarize.io.importers.layout`.
     """
 
@@ -60,6 +61,7 @@ class Given:
     variable: str | None = None
     latency: float | None = None
     walk: int | None = None
+    capture: int | None = None
     align: bool = False
     encoding: str = "signed"
     layout: str = "pairs"

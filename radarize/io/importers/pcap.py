@@ -13,8 +13,9 @@ import dpkt
 import numpy as np
 
 from radarize.io.errors import InputError, explained
-from radarize.io.importers.bin import configured
+from radarize.io.importers.bin import configured, other_period
 from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
+from radarize.io.importers.datagrams import Datagram, Start, by_start, datagram, starts
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 from radarize.radar.assembler import FrameAssembler
@@ -35,32 +36,58 @@ _LONGEST_RECORD = 1 << 18
 _MOST_LOST = 20
 
 
-def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tuple[str, ...] = ()) -> Capture:
+def open_pcap(path: Path, given: Given) -> Capture:
     """Open a network capture; an incomplete last frame is left out, lost samples are zero and marked.
 
+    Args:
+        path: the file.
+        given: what is known of the radar, and which of several captures is wanted.
+
     Raises:
-        InputError: no pcap or pcapng file of Ethernet packets, or (on reading) without a whole frame.
+        InputError: no pcap or pcapng file of Ethernet packets; no whole packet; or (on reading) without a whole frame.
     """
+    config, assumed = given.configure(str(path))
     expected = path.stat().st_size // config.frame_bytes
-    capture = Capture(config, cfg_text, (), expected, assumed)
-    capture.batches = _batches(path, capture)
-    with path.open("rb") as file:
-        _packets(file, path)
+    capture = Capture(config, given.cfg_text, (), expected, assumed)
+    found = _starts(path)
+    number = given.capture or 1
+    if not 1 <= number <= max(len(found), 1):
+        raise InputError(f"{path}: holds {len(found)} captures, but capture is {number}, expected 1 to {len(found)}")
+    start = found[number - 1] if found else None
+    if start is not None:
+        capture.warnings += start.why_lost()
+        if start.packets in (start.cut, start.fragments):
+            raise InputError(f"{path}: {'; '.join(start.why_lost())}; expected whole packets")
+    if len(found) > 1:
+        listed = "; ".join(f"{k}: {each}" for k, each in enumerate(found, 1))
+        capture.warnings.append(f"{path.name} holds {len(found)} captures ({listed}), and this is capture {number}")
+    capture.batches = _batches(path, capture, start)
     return capture
 
 
-def _batches(path: Path, capture: Capture) -> Iterator[CapturedFrames]:
+def _starts(path: Path) -> list[Start]:
+    return starts(_datagrams(path, []))
+
+
+def captures(path: Path) -> list[str]:
+    """What captures a file holds: one for each board, port, and start of the radar."""
+    return [str(each) for each in _starts(path)]
+
+
+def _batches(path: Path, capture: Capture, start: Start | None) -> Iterator[CapturedFrames]:
     assembler = FrameAssembler(capture.config)
     size = batch_frames(capture.config)
     most_lost = _MOST_LOST * path.stat().st_size
     frames: list[tuple[np.ndarray, np.ndarray]] = []
     yielded = 0
-    for frame in _frames(path, capture, assembler):
+    for frame in _frames(path, capture, assembler, start):
         if assembler.counts.lost_bytes > most_lost:
             raise InputError(
                 f"{path}: lacks more than {most_lost} bytes between its data packets, {_MOST_LOST} times its size; "
                 "expected byte counts that grow as packets come"
             )
+        if not yielded and not frames:
+            capture.warnings += _misfit(frame[0], capture.config)
         frames.append(frame)
         if len(frames) >= size:
             yielded += len(frames)
@@ -76,10 +103,24 @@ def _batches(path: Path, capture: Capture) -> Iterator[CapturedFrames]:
         yield _stack(frames, capture.config)
 
 
-def _frames(path: Path, capture: Capture, assembler: FrameAssembler) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    for time, payload in _payloads(path, capture):
-        capture.attributes.setdefault("first_packet_time", time)
-        yield from assembler.take(payload)
+def _misfit(words: np.ndarray, config: RadarConfig) -> list[str]:
+    """A warning if a frame's samples plainly repeat otherwise than configured, as with too few transmitters."""
+    if (period := other_period(words.tobytes(), config)) is None:
+        return []
+    loop = config.frame_bytes // 4 // config.loops
+    return [
+        f"samples repeat every {period} and not every {loop} (TX x RX x samples), expected the configuration of this "
+        "capture: --tx says how many transmitters there are"
+    ]
+
+
+def _frames(
+    path: Path, capture: Capture, assembler: FrameAssembler, start: Start | None
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for flow, number, packet in by_start(_datagrams(path, capture.warnings)):
+        if start is not None and (flow, number) == (start.flow, start.number):
+            capture.attributes.setdefault("first_packet_time", packet.time)
+            yield from assembler.take(packet.payload)
     yield from assembler.finish()
 
 
@@ -88,8 +129,8 @@ def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> 
     return CapturedFrames(decode(np.concatenate(words), config), np.stack(valid))
 
 
-def _payloads(path: Path, capture: Capture) -> Iterator[tuple[float, bytes]]:
-    """Arrival time (s since 1970) and UDP payload of each data packet; a warning where the file ends too early."""
+def _datagrams(path: Path, warnings: list[str]) -> Iterator[Datagram]:
+    """UDP packets; a warning where the file ends too early."""
     with path.open("rb") as file:
         packets = _packets(file, path)
         while True:
@@ -98,10 +139,10 @@ def _payloads(path: Path, capture: Capture) -> Iterator[tuple[float, bytes]]:
             except StopIteration:
                 return
             except _Broken as error:
-                capture.warnings.append(f"{path}: {error}; what follows is left out")
+                warnings.append(f"{path}: {error}; what follows is left out")
                 return
-            if payload := _udp_payload(data):
-                yield time, payload
+            if (packet := datagram(time, data)) is not None:
+                yield packet
 
 
 class _Broken(Exception):
@@ -166,20 +207,6 @@ class _Bounded:
         return self._file.read(size)
 
 
-def _udp_payload(data: bytes) -> bytes | None:
-    """Payload of an Ethernet frame that carries IPv4 and UDP to the data port, else None."""
-    start = 18 if data[12:14] == b"\x81\x00" else 14  # with or without a VLAN tag
-    if len(data) < start + 28 or data[start - 2 : start] != b"\x08\x00":
-        return None
-    if data[start] >> 4 != 4 or data[start + 9] != 17:
-        return None
-    udp = start + 4 * (data[start] & 0x0F)
-    if len(data) < udp + 8:
-        return None
-    port, length = struct.unpack_from(">HH", data, udp + 2)
-    return data[udp + 8 : udp + length] if port == DATA_PORT else None
-
-
 def _fits(source: Path) -> bool:
     if source.is_dir():
         return False
@@ -187,10 +214,11 @@ def _fits(source: Path) -> bool:
         return file.read(4) in (*MAGIC, NEXT_GENERATION) or source.suffix.lower() in (".pcap", ".pcapng")
 
 
-def _open(source: Path, given: Given, _: Path) -> Capture:
-    given = configured(source, given)
-    config, assumed = given.configure(str(source))
-    return open_pcap(source, config, given.cfg_text, assumed)
-
-
-FORMAT = Format("network capture", "a .pcap or .pcapng of its packets", _fits, _open)
+FORMAT = Format(
+    "network capture",
+    "a .pcap or .pcapng of its packets",
+    _fits,
+    lambda source, given, _: open_pcap(source, configured(source, given)),
+    options=("capture",),
+    captures=captures,
+)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import EllipsisType
 
 import h5py
 import numpy as np
@@ -14,11 +13,10 @@ from radarize.io.errors import InputError, explained
 from radarize.io.files import regular
 from radarize.io.hdf5 import dataset, open_hdf5
 from radarize.io.recording.growing import GrowingFile, is_growing
+from radarize.io.recording.stamps import Stamps
+from radarize.io.recording.unpacking import Rows
 from radarize.io.trajectory import Trajectory
 from radarize.radar.config import RadarConfig
-
-#: s, of stamps, also such as count from 1970.
-_LATEST = 1e11
 
 
 @dataclass(eq=False, repr=False)
@@ -26,6 +24,8 @@ class Recording:
     """A recording opened for reading; use as a context manager, or keep it open.
 
     ``recording[100]`` and ``recording[100:110]`` are frames, see `Clip`; ``len(recording)`` is how many there are.
+    Damaged frames cost themselves alone: what cannot be unpacked is lost (zero, and not valid), and a damaged stamp is
+    made anew from its neighbours, or its frame left out; `damage` says so.
 
     Args:
         path: an ``.h5`` file, finished, growing, or left behind by a crash.
@@ -50,14 +50,15 @@ class Recording:
                 growing = stack.enter_context(GrowingFile(self.path)) if is_growing(self.path) else None
                 self.file = stack.enter_context(open_hdf5(self.path, growing))
             with explained(f"{self.path}: not a recording of this project"):
-                self._look()
+                self._look(growing is not None)
             self._files = stack.pop_all()
 
-    def _look(self) -> None:
+    def _look(self, growing: bool) -> None:
         radar = self.file["radar"]
         self.config = RadarConfig.model_validate_json(radar.attrs["config"])
         self.cfg_text = str(radar.attrs.get("cfg", ""))
         self._clocks: dict[str, np.ndarray] = {}
+        self._read: dict[str, Rows] = {}
         self._adc = dataset(radar, "adc", self.path) if "adc" in radar else None
         if self._adc is None and "maps" not in self.file:
             raise InputError(f"{self.path}: not a recording of this project (neither /radar/adc nor /maps)")
@@ -72,13 +73,48 @@ class Recording:
                     f"{self.path}: {data.name} holds {data.dtype} of shape {data.shape[1:]}, "
                     f"expected {np.dtype(kind)} of {shape} from its configuration"
                 )
-        times = times[:]
         # A frame counts once its time is written, which happens after its samples are on disk.
-        whole = min(len(data) for data in (times, self._adc, self._valid) if data is not None)
-        unwritten = np.flatnonzero(~np.isfinite(times[:whole]))
-        self.times = times[: unwritten[0] if len(unwritten) else whole]
-        if len(self.times) and (np.abs(self.times[[0, -1]]).max() > _LATEST or np.diff(self.times).min(initial=1) <= 0):
-            raise InputError(f"{self.path}: /radar/time does not ascend, expected stamps in s within {_LATEST:g}")
+        written = {data.name: len(data) for data in (times, self._valid, self._adc) if data is not None}
+        whole = min(written.values())
+        self.written = max(written.values())
+        self._stamps = Stamps(self._rows_of(times).read(0, whole), self.config.frame_period)
+        self._leave_out_unwritten()
+        self.times = self._stamps.times
+        self._shorter = [] if growing or self.written == whole else [
+            f"{', '.join(f'{name} has {count} rows' for name, count in written.items())}: frames beyond {whole} are "
+            "left out"
+        ]  # fmt: skip
+
+    def _leave_out_unwritten(self) -> None:
+        """Leave out frames at the end that have neither stamps nor samples: those that were about to be written."""
+        mended, count = set(self._stamps.mended.tolist()), len(self._stamps.rows)
+        while self._adc is not None and count and (row := int(self._stamps.rows[count - 1])) in mended:
+            if self._rows_of(self._adc).stored(row):
+                break
+            count -= 1
+        if count < len(self._stamps.rows):
+            self._stamps.keep(np.arange(len(self._stamps.rows)) < count)
+
+    @property
+    def damage(self) -> list[str]:
+        """Sentences on what of the file is damaged, as far as it has been read; empty for a sound one.
+
+        Example:
+            >>> rec = rz.load("walk.h5")
+            >>> rec.damage
+            []
+        """
+        found = [*self._shorter, *self._stamps.warnings()]
+        for name, rows in self._read.items():
+            lost = np.flatnonzero(rows.damaged())
+            if name == "/radar/adc":
+                lost = np.flatnonzero(np.isin(self._stamps.rows, lost))
+                what = f"of {len(self)} frames cannot be unpacked and count as lost"
+            else:
+                what = f"of {len(rows.data)} rows of {name} cannot be unpacked and are left empty"
+            if len(lost):
+                found.append(f"{len(lost)} {what} (the first is {lost[0]})")
+        return found
 
     def __len__(self) -> int:
         return len(self.times)
@@ -122,22 +158,37 @@ class Recording:
             return {k: v.item() if isinstance(v, np.generic) else v for k, v in self.file.attrs.items()}
 
     def adc(self, start: int, stop: int) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
-        """Raw samples of frames start...stop-1.
+        """Raw samples of frames start...stop-1; zero where a frame's chunk on disk is damaged, see `valid`.
 
         Raises:
-            InputError: a chunk on disk is damaged, or only heat maps were kept.
+            InputError: only heat maps were kept.
         """
         if self._adc is None:
             raise InputError(f"{self.path}: has no raw samples, only heat maps, expected a recording with /radar/adc")
         return self._frames(self._adc, start, stop)
 
     def valid(self, start: int, stop: int) -> Bool[np.ndarray, "frame loop tx"]:
-        """Per chirp: False where samples were lost."""
-        return self._frames(self._valid, start, stop)
+        """Per chirp: False where samples were lost, or their frame cannot be unpacked."""
+        valid = self._frames(self._valid, start, stop)
+        if self._adc is not None and len(valid):
+            rows = self._stamps.rows[start:stop]
+            whole = self._rows_of(self._adc).whole(int(rows[0]), int(rows[-1]) + 1)
+            valid &= whole[rows - rows[0], None, None]
+        return valid
+
+    def _rows_of(self, data: h5py.Dataset) -> Rows:
+        if data.name not in self._read:
+            self._read[data.name] = Rows(data)
+        return self._read[data.name]
 
     def _frames(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
-        with explained(f"{self.path}: frames {start}...{stop - 1} of {data.name} are damaged"):
-            return data[start : min(stop, len(self))]
+        """Rows of frames start...stop-1, of data with a row for each."""
+        with explained(f"{self.path}: frames {start}...{stop - 1} of {data.name} cannot be read"):
+            rows = self._stamps.rows[start:stop]
+            first = int(rows[0]) if len(rows) else 0
+            found = self._rows_of(data).read(first, int(rows[-1]) + 1 if len(rows) else 0)
+            places = (rows - first)[rows - first < len(found)]
+            return found if len(places) == len(found) else found[places]
 
     def batches(self, size: int = 32) -> Iterator[tuple[slice, np.ndarray]]:
         """Frames in batches, as (slice of frames, raw samples)."""
@@ -157,8 +208,7 @@ class Recording:
             InputError: there is none of that name, or it is damaged.
         """
         data = self._dataset(name)
-        clock = self._clock(data)
-        return self._slice(data, slice(0, self._row(data, clock, len(self))) if clock else ...)
+        return self.rows(name, 0, len(self)) if self._clock(data) else self._slice(data)
 
     def true_poses(self) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]] | None:
         """Stamps (s) and poses (position m, quaternion x y z w) of the truth where it is known; None without truth."""
@@ -190,7 +240,17 @@ class Recording:
         data = self._dataset(name)
         if not (clock := self._clock(data)):
             raise InputError(f"{self.path}: /{name} was written once, expected a stream with rows for every frame")
-        return self._slice(data, slice(self._row(data, clock, start), self._row(data, clock, stop)))
+        if clock == "radar/time":
+            return self._frames(data, start, stop)
+        first, last = self._row(clock, start), self._row(clock, stop)
+        with explained(f"{self.path}: {data.name} cannot be read"):
+            found = self._rows_of(data).read(first, last)
+        ticks = self._clocks[clock][first:last]
+        if ticks.dtype.kind == "f" or len(self._stamps.rows) == len(self._stamps.written):
+            return found
+        numbers = np.searchsorted(self._stamps.rows, ticks)  # of frames, where some rows are none
+        known = np.isin(ticks, self._stamps.rows)[: len(found)]
+        return (numbers.astype(found.dtype) if name == clock else found)[known]
 
     def _clock(self, data: h5py.Dataset) -> str:
         """Name of the data set that says what a stream's rows belong to; empty where there is none."""
@@ -200,21 +260,22 @@ class Recording:
                 raise InputError(f"{self.path}: {data.name} is a single value with a clock, expected rows")
             return clock
 
-    def _row(self, data: h5py.Dataset, clock: str, frame: int) -> int:
-        """First row of a stream that belongs to `frame` or a later one."""
-        frame = int(np.clip(frame, 0, len(self)))
-        if clock == "radar/time" or not len(self):
-            return min(frame, len(data))
+    def _row(self, clock: str, frame: int) -> int:
+        """First row of a stream at its own rate that belongs to `frame` or a later one."""
         if clock not in self._clocks:
-            self._clocks[clock] = self._slice(self._dataset(clock), ...)
+            self._clocks[clock] = self._slice(self._dataset(clock))
         ticks = self._clocks[clock]
         if ticks.ndim != 1 or ticks.dtype.kind not in "iuf":
             raise InputError(f"{self.path}: /{clock} holds {ticks.dtype} of shape {ticks.shape}, expected a clock")
+        frame = int(np.clip(frame, 0, len(self)))
+        if not len(self):
+            return 0
         if ticks.dtype.kind == "f":
             after = self.times[-1] + self.config.frame_period
             # Sums and products of the same period differ in the last bit; no sample falls between the two.
-            frame = (self.times[frame] if frame < len(self) else after) - 1e-9
-        return min(int(np.searchsorted(ticks, frame)), len(data))
+            return int(np.searchsorted(ticks, (self.times[frame] if frame < len(self) else after) - 1e-9))
+        rows = self._stamps.rows
+        return int(np.searchsorted(ticks, rows[frame] if frame < len(self) else rows[-1] + 1))
 
     def _dataset(self, name: str) -> h5py.Dataset:
         if not self.has(name):
@@ -222,9 +283,9 @@ class Recording:
         with explained(f"{self.path}: /{name} is damaged"):
             return dataset(self.file, name, self.path)
 
-    def _slice(self, data: h5py.Dataset, rows: slice | EllipsisType) -> np.ndarray:
+    def _slice(self, data: h5py.Dataset) -> np.ndarray:
         with explained(f"{self.path}: {data.name} is damaged"):
-            return data[rows]
+            return data[...]
 
     def names(self) -> list[str]:
         """Paths of all data sets."""

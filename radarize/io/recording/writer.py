@@ -2,12 +2,15 @@
 
 A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
 recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
-flushed so far. No clock of the writing machine goes into the file or its layout: same content, same bytes.
+flushed so far. What is flushed is also brought to the disk itself (fsync), at most twice a second by the clock on the
+wall, so a power cut costs a capture what came in the last second. No clock of the writing machine goes into the file or
+its layout: same content, same bytes.
 """
 
 import errno
 import os
 import shutil
+import time as clock
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -30,6 +33,8 @@ from radarize.radar.config import RadarConfig
 #: Bytes claimed of the disk beyond what is written, for HDF5's own structures. HDF5 writes chunks when it drops them
 #: from its cache, where h5py reports no error: they must have their place on the disk before.
 _RESERVE = 512 << 10
+#: s from one fsync to the next at least: flushes of a capture come once a second, of an import far more often.
+_PACE = 0.5
 #: Of the layout.
 _FORMAT = 1
 
@@ -106,6 +111,7 @@ class RecordingWriter:
         self._notes: dict[str, object] = {}
         self._pending: list[np.ndarray] = []
         self._unflushed = self._waiting = 0  # frames, bytes
+        self._synced = clock.monotonic()
         if not overwrite:
             spare(self.path)
         try:
@@ -218,8 +224,13 @@ class RecordingWriter:
         self._notes.update(attributes)
 
     def flush(self) -> None:
-        """Make every appended frame visible to readers. Times go last: a frame counts once its time is there."""
+        """Make every appended frame visible to readers. Times go last: a frame counts once its time is there.
+
+        So do they on the disk: what the system has not been asked to write, it may write in any order.
+        """
         self._opened.flush()
+        if due := clock.monotonic() - self._synced >= _PACE:
+            os.fsync(self._room)
         self._waiting = 0
         self._claim(0)  # HDF5 cuts the file to what it holds
         for times in self._pending:
@@ -227,6 +238,9 @@ class RecordingWriter:
             self.frames += len(times)
         self._pending.clear()
         self._opened["radar/time"].flush()
+        if due:
+            os.fsync(self._room)
+            self._synced = clock.monotonic()
         self._unflushed = 0
 
     @contextmanager
@@ -244,13 +258,15 @@ class RecordingWriter:
                 self.flush()
                 os.ftruncate(self._room, self._file.id.get_filesize())  # what was claimed and not used
                 self._file.close()
-                os.close(self._room)
                 os.close(self._held)
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
                     with open_hdf5(self.part, mode="r+") as file:
                         file.attrs.update(_storable(self._notes))
+                os.fsync(self._room)
+                os.close(self._room)
                 if not keep_part:
                     os.replace(self.part, self.path)
+                    _sync_folder(self.path.parent)
 
     def __enter__(self) -> "RecordingWriter":
         return self
@@ -262,6 +278,16 @@ class RecordingWriter:
         else:
             with suppress(InputError):  # the first error is the one to report
                 self.close(keep_part=True)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring a folder's names to the disk, where the system knows how."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _failed(what: str, part: Path, error: Exception) -> InputError:

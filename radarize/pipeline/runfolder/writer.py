@@ -123,7 +123,7 @@ class RunWriter:
             "duration_s": float(times[-1] - times[0] + period),
             "blind": blindness.found.model_dump(),
             "health": [each.model_dump() for each in self.health.found],
-            "warnings": self.health.warnings(),
+            "warnings": [*recording.damage, *self.health.warnings()],
             "radar": recording.config.model_dump(mode="json"),
         }
         rows = np.searchsorted(recording.times + recording.config.burst_center, times[:])

@@ -31,6 +31,9 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 _LIKELY = (1.5, 300.0)
 _STOREY = 2.7  # m
 _LARGEST = 2000.0  # m; ray tests compute in single precision
+#: A floor lies within this share of a mesh's height, or so many m, from its lowest corner; what is higher is a ceiling
+#: if it covers this share of the mesh from above, within so many m.
+_LOW, _LEAST_ROOM, _COVERS, _THICK = 0.5, 1.0, 0.5, 0.3
 #: Scenes that lie further from the origin are moved to it, m.
 _FAR = 500.0
 
@@ -257,26 +260,45 @@ def _guess(parts: list[Part], remarks: list[str]) -> str:
 
 
 def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:
-    """Bring the floor to z = 0 and a scene from afar to the origin, in place."""
+    """Bring the floor to z = 0 and a scene from afar to the origin, in place; a room without a floor gets one."""
     corners = _corners(parts)
     low, high = corners.min(axis=0), corners.max(axis=0)
     shift = np.zeros(3)
     if max(np.abs(low[:2]).max(), np.abs(high[:2]).max()) > _FAR:
         shift[:2] = -(low[:2] + high[:2]) / 2
     if floor:
-        shift[2] = -_floor_level(parts)
+        level, area = _lowest(parts)
+        lacks = level - low[2] > max(_LOW * (high[2] - low[2]), _LEAST_ROOM)
+        shift[2] = -low[2] if lacks else -level
+        if lacks and area > _COVERS * np.prod((high - low)[:2]):
+            remarks.append(
+                f"it has a ceiling {level - low[2]:.2f} m above its lowest corner, and no floor: one is put there"
+            )
+            parts.append(_floor(low, high))
+        elif lacks:
+            remarks.append("it has no floor: its lowest corner is taken for the ground, of which there are no echoes")
     if np.any(np.abs(shift) > 1e-6):
         remarks.append("moved by {:.3f} {:.3f} {:.3f} m".format(*shift))
         for part in parts:
             part.mesh.vertices = np.asarray(part.mesh.vertices) + shift
 
 
-def _floor_level(parts: list[Part]) -> float:
-    """Height of the lowest large horizontal surface, or of the lowest corner if there is none, m."""
+def _lowest(parts: list[Part]) -> tuple[float, float]:
+    """Height (m) and area (m^2) of the lowest large horizontal surface; of the lowest corner if there is none."""
     flat = [np.abs(part.mesh.face_normals[:, 2]) > 0.9 for part in parts]
-    level = np.concatenate([part.mesh.triangles_center[some, 2] for part, some in zip(parts, flat, strict=True)])
-    area = np.concatenate([part.mesh.area_faces[some] for part, some in zip(parts, flat, strict=True)])
-    return round(lowest_level(level, area), 6) if len(level) else float(_corners(parts)[:, 2].min())
+    levels = np.concatenate([part.mesh.triangles_center[some, 2] for part, some in zip(parts, flat, strict=True)])
+    areas = np.concatenate([part.mesh.area_faces[some] for part, some in zip(parts, flat, strict=True)])
+    if not len(levels):
+        return float(_corners(parts)[:, 2].min()), 0.0
+    level = round(lowest_level(levels, areas), 6)
+    return level, float(areas[np.abs(levels - level) < _THICK].sum())
+
+
+def _floor(low: np.ndarray, high: np.ndarray) -> Part:
+    """A floor below a box."""
+    (x, y, z), (right, far, _) = low, high
+    corners = [(x, y, z), (right, y, z), (right, far, z), (x, far, z)]
+    return Part("floor", trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], process=False), "concrete")
 
 
 def _write(path: Path, parts: list[Part], source: Path) -> None:

@@ -232,6 +232,22 @@ def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path)
         assert "by 2.92 ms in the median and 393.18 ms at most" in recording.attributes["stamps"]
 
 
+@pytest.mark.parametrize("jump", [0.2, 1.0, 3600.0])
+def test_a_header_ahead_of_its_receipt_is_not_believed(tmp_path, jump):
+    """The others are kept, also where headers go on by half a second after a pause."""
+    times = SMALL.frame_period * np.arange(60)
+    times[40:] += 0.5
+    stamps = times.copy()
+    stamps[[20, 30, 31]] += jump
+    with BagWriter(tmp_path / "a.bag", 1) as bag:
+        for k, (time, frame) in enumerate(zip(times, noise(SMALL, 60), strict=True)):
+            bag.frame(time, frame, SMALL, latency=0.02 + (0.025 if k == 10 else 0.001 * (k % 3)), stamp=stamps[k])
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
+        assert len(recording) == 60 and np.array_equal(recording.adc(0, 99), noise(SMALL, 60))
+        assert recording.times - EPOCH == pytest.approx(times, abs=1e-6)
+        assert "3 frames have a header ahead of their receipt" in recording.attributes["warnings"]
+
+
 def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
     times = np.array([0, 1, 2, 5, 5, 6]) * 0.05
     write(tmp_path / "a.bag", SMALL, times)

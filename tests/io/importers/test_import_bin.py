@@ -13,6 +13,8 @@ from radarize.io.recording import Recording, RecordingWriter
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
+from tests.io.importers.test_import_pcap import pcap, udp
+from tests.packets import packets
 
 CONFIG = RadarConfig(
     start_frequency=77e9,
@@ -107,6 +109,20 @@ def test_a_wrong_sample_count_is_refused_with_both_sizes(tmp_path, samples):
         return
     with pytest.raises(InputError, match=rf"repeat every 384 and not every {12 * samples} \(TX x RX x samples\)"):
         import_recording(source, tmp_path / "a.h5", Given(config=wrong))
+
+
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("packed", [False, True])
+def test_one_transmitter_for_several_is_noticed(tmp_path, count, packed):
+    config = CONFIG.model_copy(update={"tx_order": (0, 1, 2)[:count]})
+    wrong = config.model_copy(update={"tx_order": (0,), "loops": count * config.loops})
+    frames = room(config, 3)
+    source = write_bin(tmp_path / "a.bin", frames, config)
+    if packed:
+        source = pcap(tmp_path / "a.pcap", [udp(packet.encode()) for packet in packets(source.read_bytes())])
+    import_recording(source, tmp_path / "a.h5", Given(config=wrong))
+    with Recording(tmp_path / "a.h5") as recording:
+        assert f"repeat every {128 * count} and not every 128 (TX x RX x samples)" in recording.attributes["warnings"]
 
 
 def test_odd_sample_counts_are_refused(tmp_path):

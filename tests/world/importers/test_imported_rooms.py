@@ -15,6 +15,7 @@ from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
+from radarsim.world.clearance import ground_level
 from radarsim.world.importers import Options, import_scene
 from radarsim.world.scene import Scene
 
@@ -118,3 +119,31 @@ def test_a_scene_without_echoes_is_refused(tmp_path, capsys):
     assert exit_.value.code == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "block: no frame has an echo, expected surfaces" in said and not (tmp_path / "a.h5").exists()
+
+
+def walls_of_a_room():
+    return shapes.joined(
+        *(shapes.box(middle, size) for middle, size in (
+            ((3, -0.05, 1.3), (6, 0.1, 2.6)), ((3, 4.05, 1.3), (6, 0.1, 2.6)),
+            ((-0.05, 2, 1.3), (0.1, 4, 2.6)), ((6.05, 2, 1.3), (0.1, 4, 2.6)),
+        ))
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("table", [False, True])
+def test_a_room_without_a_floor_gets_one(tmp_path, table):
+    """It stays where it is, and one walks in it, not on its roof."""
+    meshes = [walls_of_a_room(), shapes.box((3, 2, 2.65), (6.2, 4.2, 0.1))]
+    done = brought(tmp_path, *meshes, *([shapes.box((1, 1, 0.75), (1.2, 0.6, 0.05))] if table else []))
+    assert not any("moved by" in remark for remark in done.remarks)
+    assert any("has a ceiling 2." in remark and "no floor: one is put there" in remark for remark in done.remarks)
+    scene = Scene.load(done.path)
+    assert ground_level(scene) == 0 and scene.bounds[1, 2] == pytest.approx(2.7)
+    motion = plan_motion(scene, "handheld", 3.0, np.random.default_rng(0))
+    height = motion.position(np.linspace(0, 3, 20))[:, 2]
+    assert ((height > 0.5) & (height < 2.2)).all()
+
+
+def test_walls_alone_stand_on_the_ground(tmp_path):
+    done = brought(tmp_path, walls_of_a_room().apply_translation((0, 0, 1)))
+    assert Scene.load(done.path).bounds[0, 2] == pytest.approx(0)

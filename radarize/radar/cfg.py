@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
+from typing import Any
 
 from radarize.io.errors import InputError
 from radarize.io.files import read_bytes
@@ -133,7 +134,7 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
     order, profile = _firing(last["frameCfg"], commands["chirpCfg"], commands["profileCfg"], channel)
     tx_order, repeats = distinct_order(order, f"{name}, line {last['frameCfg'].line}: frameCfg")
     board = _board(text, profile.decimal("startFreq", 9), name)
-    bias, calibration = _calibration(last)
+    calibration = _calibration(last)
     return RadarConfig.build(
         name,
         board=board,
@@ -155,8 +156,7 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
             HIGH_PASS_2[profile.integer("hpfCornerFreq2", 0, 3)],
         ),
         iq_order="qqii" if swap else "iiqq",
-        range_bias=bias,
-        channel_calibration=calibration,
+        **calibration,
     )
 
 
@@ -253,8 +253,9 @@ def _backoff(profile: Command, tx_order: tuple[int, ...]) -> float:
     return steps.pop()
 
 
-def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, float], ...]]:
-    factors = [1 + 0j] * 12  # not measured
+def _calibration(last: dict[str, Command]) -> dict[str, Any]:
+    """What was measured; nothing where the file holds what TI's hold before anybody has."""
+    factors = [1 + 0j] * 12
     bias = 0.0
     if command := last.get("compRangeBiasAndRxChanPhase"):
         bias = command.decimal("rangeBias")
@@ -262,7 +263,8 @@ def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, fl
     if command := last.get("antPhaseRot"):  # people-counting firmware: signs of the receivers' feeds
         signs = [command.require(f"rotation{i}", (-1, 1), "in or out of phase") for i in range(12)]
         factors = [s * f for s, f in zip(signs, factors, strict=True)]
-    return bias, tuple((f.real, f.imag) for f in factors)
+    pairs = tuple((f.real, f.imag) for f in factors)
+    return {"channel_calibration": pairs} | ({"range_bias": bias} if bias or set(pairs) != {(1.0, 0.0)} else {})
 
 
 # --- writing ----------------------------------------------------------------------------------------------------------

@@ -42,9 +42,10 @@ class RadarConfig(BaseModel):
         tx_backoff_db: transmit power below maximum, dB.
         high_pass: corner frequencies of the two high-pass stages, Hz.
         iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo).
-        range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
+        range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``); the board's,
+            unless given.
         channel_calibration: measured complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, then TX2,
-            TX3. None: not measured, and the board's nominal one applies, which takes its receivers' signs off. Twelve
+            TX3. None: the board's applies: measured, or the nominal one, which takes its receivers' signs off. Twelve
             ones, which TI's files hold before anybody has measured, count as None.
     """
 
@@ -78,6 +79,16 @@ class RadarConfig(BaseModel):
         if info.mode == "json" or not str(board).endswith(SUFFIXES):  # a recording names no files
             raise ValueError(f"expected {expected()}")
         return load_board(board)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bias_of_board(cls, fields: Any, info: ValidationInfo) -> Any:
+        if not isinstance(fields, dict) or "range_bias" in fields or info.mode == "json":
+            return fields
+        try:
+            return {**fields, "range_bias": load_board(fields["board"]).range_bias} if "board" in fields else fields
+        except (InputError, TypeError):
+            return fields  # the field's own validator says what is wrong
 
     @field_validator("channel_calibration")
     @classmethod
@@ -134,15 +145,20 @@ class RadarConfig(BaseModel):
     def changed(self, source: str, **fields: Any) -> "RadarConfig":
         """The radar with some fields changed; `source` is what errors name as their origin.
 
-        A calibration was measured on one board: on another, the other's nominal one applies unless one is given.
+        A calibration was measured on one board: on another, the other's applies unless one is given, and so does the
+        range bias of a board that was measured.
 
         Raises:
             InputError: as `build`.
         """
         found = RadarConfig.build(source, **{**self.model_dump(), **fields})
-        if "channel_calibration" in fields or load_board(found.board) == load_board(self.board):
+        board, before = load_board(found.board), load_board(self.board)
+        if board == before:
             return found
-        return found.model_copy(update={"channel_calibration": None})
+        measured: dict[str, Any] = {"channel_calibration": None}
+        if board.calibration or before.calibration:
+            measured["range_bias"] = board.range_bias
+        return found.model_copy(update={name: each for name, each in measured.items() if name not in fields})
 
     # --- array -----------------------------------------------------------------------------------------------------
     @property
@@ -265,5 +281,5 @@ class RadarConfig(BaseModel):
     @property
     def channel_factors(self) -> Complex[np.ndarray, "3 4"]:
         """The same of all physical (tx, rx): measured, or the board's nominal ones."""
-        pairs = self.channel_calibration or load_board(self.board).nominal_calibration
+        pairs = self.channel_calibration or load_board(self.board).factors
         return np.array([complex(*pair) for pair in pairs]).reshape(3, 4)

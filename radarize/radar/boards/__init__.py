@@ -21,6 +21,25 @@ SUFFIXES = (".yaml", ".yml")
 Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
 Place = tuple[Coordinate, Coordinate]
 Sign = Literal[-1, 1]
+Part = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class Mounting(Frozen):
+    """Where the sensor sits on its carrier, each value as far as a walk showed it, else None.
+
+    Attributes:
+        height: over the floor, m.
+        lever_arm: ahead of the carrier's axle, m.
+        yaw: of the sensor to the carrier's way ahead, rad, positive to the left.
+        tilt: by how much the front is raised, rad.
+        lean: by how much the left side is raised, rad.
+    """
+
+    height: float | None = None
+    lever_arm: float | None = None
+    yaw: float | None = None
+    tilt: float | None = None
+    lean: float | None = None
 
 
 class Board(Frozen):
@@ -33,6 +52,10 @@ class Board(Frozen):
         design_frequency: of the antenna spacings, Hz.
         tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
         rx_sign: -1 for receivers fed from the opposite side of the patch, whose signal is turned by 180 deg.
+        calibration: measured factor per physical (tx, rx) as (re, im) pairs, to be multiplied onto samples, signs of the
+            receivers included; None: not measured.
+        range_bias: m, measured ranges less the true ones.
+        mounting: of the sensor; None: not measured. For the reader: nothing is computed from it.
         front_end: fields of `radarsim.receiver.frontend_config.FrontEndConfig`, which only the simulator reads.
     """
 
@@ -43,6 +66,9 @@ class Board(Frozen):
     tx: tuple[Place, Place, Place]
     rx: tuple[Place, Place, Place, Place]
     rx_sign: tuple[Sign, Sign, Sign, Sign] = (1, 1, 1, 1)
+    calibration: tuple[tuple[Part, Part], ...] | None = Field(None, min_length=12, max_length=12)
+    range_bias: float = Field(0.0, ge=-1000, le=1000)
+    mounting: Mounting | None = None
     front_end: dict[str, Any]
 
     @field_validator("front_end", mode="before")
@@ -58,6 +84,11 @@ class Board(Frozen):
     def nominal_calibration(self) -> tuple[tuple[float, float], ...]:
         """Factor per physical (tx, rx) as (re, im) pairs that takes the receivers' signs off again."""
         return tuple((float(sign), 0.0) for sign in self.rx_sign) * 3
+
+    @property
+    def factors(self) -> tuple[tuple[float, float], ...]:
+        """The measured factors, or the nominal ones."""
+        return self.calibration or self.nominal_calibration
 
     def __str__(self) -> str:
         return self.name

@@ -15,6 +15,7 @@ from radarize.io.files import regular
 from radarize.io.hdf5 import dataset, open_hdf5
 from radarize.io.recording.growing import GrowingFile, is_growing
 from radarize.io.trajectory import Trajectory
+from radarize.radar.boards import Board
 from radarize.radar.config import RadarConfig
 
 #: s, of stamps, also such as count from 1970.
@@ -29,6 +30,7 @@ class Recording:
 
     Args:
         path: an ``.h5`` file, finished, growing, or left behind by a crash.
+        board: of the radar, with its calibration, instead of the recording's own: a board's file, a name, or a board.
 
     Attributes:
         config: of the radar.
@@ -39,6 +41,7 @@ class Recording:
     """
 
     path: Path
+    board: str | Path | Board | None = None
     config: RadarConfig = field(init=False)
     times: Float[np.ndarray, "frame"] = field(init=False)
 
@@ -51,6 +54,8 @@ class Recording:
                 self.file = stack.enter_context(open_hdf5(self.path, growing))
             with explained(f"{self.path}: not a recording of this project"):
                 self._look()
+            if self.board is not None:
+                self.config = self.config.changed(str(self.board), board=self.board)
             self._files = stack.pop_all()
 
     def _look(self) -> None:

@@ -14,8 +14,8 @@ from radarize.io.errors import InputError
 from radarize.io.load import Source, frames_of
 from radarize.io.recording import Clip
 from radarize.io.replacing import replacing
-from radarize.pipeline.calibration.cells import cells_of, uncalibrated
-from radarize.pipeline.calibration.channels import Array, centred, fit_channels
+from radarize.pipeline.calibration.cells import Cells, cells_of, uncalibrated
+from radarize.pipeline.calibration.channels import Array, Waves, centred, fit_channels
 from radarize.pipeline.calibration.egomotion import LEAN, SCALE, SHIFT_LEFT, SHIFT_UP, TILT, EgoMotion, solve
 from radarize.pipeline.calibration.mounting import Estimate, height, roll
 from radarize.pipeline.calibration.parallax import RangeBias, find_bias
@@ -30,7 +30,8 @@ from radarize.radar.config import RadarConfig
 _FRAMES, _WAY, _SHORT, _FEW_TURNS = 60, 1.0, 8.0, np.radians(90.0)
 #: Standard errors from which on a warning is due: phases, rad RMS; gains, dB RMS; range bias, m.
 _PHASE, _GAIN, _BIAS = np.radians(2.0), 0.3, 0.02
-#: The scale of the azimuth is taken from this on, and so many standard errors: antennas stand where the board's file says.
+#: The scale of the azimuth is taken from this on, and so many standard errors: antennas stand where the board's file
+#: says.
 _SCALE, _SURE = 0.01, 4.0
 
 
@@ -69,8 +70,29 @@ class Calibration:
         signs = np.asarray(self.board.rx_sign)[list(self.config.rx)]
         return -centred((self.config.calibration * signs).ravel()).reshape(self.config.calibration.shape)
 
+    @property
+    def tables(self) -> list[tuple[tuple[str, ...], list[tuple[object, ...]], tuple[int, ...]]]:
+        """Channels, and the rest, for `radarize.io.console.print_table`."""
+        gain, phase = np.moveaxis(self.errors, -1, 0)
+        channels: list[tuple[object, ...]] = [
+            (
+                f"TX{tx + 1} RX{rx + 1}",
+                f"{self.gains[i, j]:.2f} +- {gain[i, j]:.2f}",
+                f"{np.degrees(self.phases[i, j]):.1f} +- {np.degrees(phase[i, j]):.1f}",
+            )
+            for i, tx in enumerate(self.config.tx)
+            for j, rx in enumerate(self.config.rx)
+        ]
+        rest: list[tuple[object, ...]] = [
+            (name.replace("_", " "), *_shown(name, each)) for name, each in self.values.items()
+        ]
+        return [
+            (("channel", "gain, dB", "phase, deg"), channels, (1, 2)),
+            (("quantity", "value", "unit"), rest, (1,)),
+        ]
+
     def save(self, path: str | Path) -> Path:
-        """Write a board's file (``.yaml``), or the radar's configuration with ``compRangeBiasAndRxChanPhase`` (``.cfg``).
+        """Write a board's file (``.yaml``), or a ``.cfg`` with ``compRangeBiasAndRxChanPhase``.
 
         Raises:
             InputError: another suffix, or it cannot be written.
@@ -82,7 +104,10 @@ class Calibration:
             update = {"channel_calibration": _pairs(factors), "board": self.board.model_copy(update=_UNMEASURED)}
             text = write_cfg(self.config.model_copy(update=update))
         elif path.suffix in SUFFIXES:
-            remarks = [self.source, *(f"{name}: {_words(each)}" for name, each in self.values.items())]
+            remarks = [
+                self.source,
+                *(" ".join((f"{name}:", *_shown(name, each))) for name, each in self.values.items()),
+            ]
             fields = self.board.model_dump(mode="json", exclude_none=True, exclude={"name"})
             text = "".join(f"# {remark}\n" for remark in remarks) + yaml.safe_dump(
                 fields, sort_keys=False, default_flow_style=None, width=120
@@ -196,19 +221,21 @@ def _walk(frames: Clip, progress: Callable[[int, int], None]) -> Calibration:
 _NO_PARALLAX = "no point was passed by that shows a parallax"
 
 
-def _range_bias(frames: Clip, config: RadarConfig, cells, waves, motion: EgoMotion) -> tuple[RangeBias, np.ndarray]:
+def _range_bias(
+    frames: Clip, config: RadarConfig, cells: Cells, waves: Waves, motion: EgoMotion
+) -> tuple[RangeBias, Float[np.ndarray, "frame"]]:
     """The bias, and headings at the frames: odometry's, whose map is blurred by a bias, so it is asked twice."""
-    period, found = config.frame_period, None
+    period = config.frame_period
+    times = cells.time[0] + period * np.arange(len(motion.velocity))
     for _ in range(2):
-        at = config if found is None else config.model_copy(update={"range_bias": round(found.value, 5)})
-        track = estimate_odometry(recalibrated(frames, at), "doppler")
+        track = estimate_odometry(recalibrated(frames, config), "doppler")
         turned = np.unwrap(Rotation.from_quat(track.pose[:, 3:]).as_euler("ZYX")[:, 0])
-        times = cells.time[0] + period * (np.arange(len(motion.velocity)) - cells.frame[0])
         yaw = np.interp(times, track.time, turned)
         tracks = tracks_of(cells, waves, motion, np.gradient(yaw) / period, period)
         found = find_bias(cells, tracks, motion, yaw, period)
-        if abs(found.value) < _BIAS or not np.isfinite(found.error):
+        if abs(found.value - config.range_bias) < _BIAS or not np.isfinite(found.error):
             break
+        config = config.model_copy(update={"range_bias": round(found.value, 5)})
     return found, yaw
 
 
@@ -258,5 +285,16 @@ def _judged(found: Calibration) -> Calibration:
     return replace(found, warnings=told)
 
 
-def _words(each: Estimate) -> str:
-    return f"not observable: {each.why}" if each.why else f"{each.value:.4f} +- {each.error:.4f}"
+#: Units of the further values in tables and files, and by what SI values are multiplied.
+_UNITS = {
+    "range_bias": ("m", 1.0), "azimuth_scale": ("", 1.0), "height": ("m", 1.0), "lever_arm": ("m", 1.0),
+    **dict.fromkeys(("tilt", "lean", "yaw"), ("deg", 180 / np.pi)),
+}  # fmt: skip
+
+
+def _shown(name: str, each: Estimate) -> tuple[str, str]:
+    """Value with its standard error, and unit; or why there is none."""
+    unit, factor = _UNITS[name]
+    return (
+        ("not observable", each.why) if each.why else (f"{factor * each.value:.3f} +- {factor * each.error:.3f}", unit)
+    )

@@ -93,7 +93,8 @@ def cells_of_batch(batch: Batch) -> Cells:
 def joined(parts: list[Cells], antennas: int) -> Cells:
     """Cells of consecutive batches as one."""
     if not parts:
-        return Cells(np.zeros(0, int), *np.zeros((4, 0)), np.zeros((0, antennas), np.complex64))
+        none = np.zeros(0)
+        return Cells(np.zeros(0, int), none, none, none, none, np.zeros((0, antennas), np.complex64))
     return Cells(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Cells)))
 
 

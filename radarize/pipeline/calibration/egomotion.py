@@ -1,12 +1,12 @@
 """Velocities of a walk, and by what directions are wrong, from echoes of a static world.
 
-An echo from direction u closes at v . u, v being the sensor's velocity. A phase that grows evenly along the array shifts
-all direction cosines by the same amount. A shift to the left looks like a course farther to the right, but only for
-echoes ahead: for echoes to the side, whose u_x = sqrt(1 - u_y^2 - u_z^2) changes the faster, it does not. So the wide
-azimuths of a walk tell the shift from the course. Elevations are bound twice: the sensor moves level, so that its tilt is
-in its velocity, and so are the reflections of upright walls, the strongest of all echoes. All is solved at once: a
-velocity for each frame; shifts, a scale of the azimuth and the tilt for the walk; by least squares with weights that
-outliers lose (Geman-McClure).
+An echo from direction u closes at v . u, v being the sensor's velocity. A phase that grows evenly along the array
+shifts all direction cosines by the same amount. A shift to the left looks like a course farther to the right, but only
+for echoes ahead: for echoes to the side, whose u_x = sqrt(1 - u_y^2 - u_z^2) changes the faster, it does not. So the
+wide azimuths of a walk tell the shift from the course. Elevations are bound twice: the sensor moves level, so that its
+tilt is in its velocity, and so are the reflections of upright walls, the strongest of all echoes. All is solved at
+once: a velocity for each frame; shifts, a scale of the azimuth and the tilt for the walk; by least squares with weights
+that outliers lose (Geman-McClure).
 """
 
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ from radarize.pipeline.calibration.channels import PARTS, Array, Waves
 from radarize.radar.config import RadarConfig
 from radarize.signal.heatmaps import Heatmaps
 
-#: What is solved for beside the velocities, and its standard deviation before anything was measured: shifts of direction
-#: cosines to the left and up, scale of the one to the left less 1, and by how much the sensor's front and its left side
-#: are raised, rad.
+#: What is solved for beside the velocities, and its standard deviation before anything was measured: shifts of
+#: direction cosines to the left and up, scale of the one to the left less 1, and by how much the sensor's front and its
+#: left side are raised, rad.
 SHIFT_LEFT, SHIFT_UP, SCALE, TILT, LEAN = VALUES = range(5)
 _EXPECTED = np.array([1.0, 1.0, 0.05, np.radians(3.0), np.radians(3.0)])
 #: Purity of cells that count; largest sine of azimuth; fewest cells and agreeing ones of a frame.

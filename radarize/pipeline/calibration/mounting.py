@@ -1,8 +1,9 @@
 """Where the sensor sits on its carrier, as far as the motion shows it.
 
-Height: the floor's echoes. Yaw and lever arm: a carrier on wheels rolls straight ahead, so that the sensor, mounted with
-yaw psi at l_x ahead of the axle, moves with v_y cos(psi) + v_x sin(psi) = omega l_x. Whoever walks also steps sideways,
-and shows neither; how far to the side the sensor sits changes only the speed in turns, which nothing else measures.
+Height: the floor's echoes. Yaw and lever arm: a carrier on wheels rolls straight ahead, so that the sensor, mounted
+with yaw psi at l_x ahead of the axle, moves with v_y cos(psi) + v_x sin(psi) = omega l_x. Whoever walks also steps
+sideways, and shows neither; how far to the side the sensor sits changes only the speed in turns, which nothing else
+measures.
 """
 
 from typing import NamedTuple

@@ -1,11 +1,11 @@
 """The range bias from parallax: how far away a point is, its direction says while the sensor passes by.
 
 Ranges alone do not show a bias that they all share, nor do Doppler shifts. But as the sensor moves across by d, the
-direction of a point at distance r turns by d / r: with a bias in its measured range, direction and range contradict each
-other. A point is fitted to each echo that is followed (`radarize.pipeline.calibration.tracks`), by ranges and
+direction of a point at distance r turns by d / r: with a bias in its measured range, direction and range contradict
+each other. A point is fitted to each echo that is followed (`radarize.pipeline.calibration.tracks`), by ranges and
 directions; the turns of the sensor, whose errors look like parallax, are solved for together with them, and the bias,
-which is one for all. A wall's specular reflection is no point, as it stays on the wall's normal: no point fits it, and it
-is left out.
+which is one for all. A wall's specular reflection is no point, as it stays on the wall's normal: no point fits it, and
+it is left out.
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ from radarize.pipeline.calibration.egomotion import EgoMotion
 
 #: Standard deviations of a measured range (m) and of direction cosines to the left and up; of a point's height over the
 #: sensor, m; and of a turn from one frame to the next as odometry has it, rad.
-_RANGE, _LEFT, _UP, _HEIGHT, _TURN = 0.008, 0.008, 0.05, 0.6, np.radians(0.25)
+_RANGE, _LEFT, _UP, _HEIGHT, _TURN = 0.008, 0.008, 0.05, 0.6, np.radians(0.5)
 #: m, standard deviation of a bias before anything was measured; the largest that is taken for one.
 _BIAS, _LARGEST = 0.3, 0.45
 #: A track counts whose own bias has this standard error at most, m, and such a mean square of residuals.
-_PRECISE, _FITS = 0.1, 3.0
+_PRECISE, _FITS = 0.2, 3.0
 _SIGMAS, _ROUNDS, _ALONE = 3.0, 10, 8
 #: Groups of tracks without each of which the bias is solved for again.
 _GROUPS = 10

@@ -1,8 +1,8 @@
 """Calibration by a corner reflector at a known distance straight ahead of a radar that stands still.
 
-As the SDK demo's ``measureRangeBiasAndRxChanPhase`` does it (mmWave SDK user's guide): the strongest echo within a window
-about the distance gives the range bias, measured less true range, and its amplitude in each channel the factors. The
-array is compared with the echo of a point at that distance, so its directions are right without any motion.
+As the SDK demo's ``measureRangeBiasAndRxChanPhase`` does it (mmWave SDK user's guide): the strongest echo within a
+window about the distance gives the range bias, measured less true range, and its amplitude in each channel the factors.
+The array is compared with the echo of a point at that distance, so its directions are right without any motion.
 """
 
 from typing import NamedTuple

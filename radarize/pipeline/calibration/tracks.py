@@ -8,7 +8,7 @@ from radarize.pipeline.calibration.channels import Waves
 from radarize.pipeline.calibration.egomotion import EgoMotion
 
 #: Purity of cells that are followed, largest sine of azimuth, and m/s that a static world may be off.
-_PURE, _EDGE, _STATIC = 0.8, 0.93, 0.06
+_PURE, _EDGE, _STATIC = 0.8, 0.93, 0.1
 #: Frames after which an echo that is not seen is given up, and the fewest that make a track.
 _LOST, _FEWEST = 3, 12
 #: By how much an echo differs from its prediction: range, m; direction cosines to the left and up; speed, m/s; and the

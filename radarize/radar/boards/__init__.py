@@ -52,8 +52,8 @@ class Board(Frozen):
         design_frequency: of the antenna spacings, Hz.
         tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
         rx_sign: -1 for receivers fed from the opposite side of the patch, whose signal is turned by 180 deg.
-        calibration: measured factor per physical (tx, rx) as (re, im) pairs, to be multiplied onto samples, signs of the
-            receivers included; None: not measured.
+        calibration: measured factor per physical (tx, rx) as (re, im) pairs, to be multiplied onto samples, signs of
+            the receivers included; None: not measured.
         range_bias: m, measured ranges less the true ones.
         mounting: of the sensor; None: not measured. For the reader: nothing is computed from it.
         front_end: fields of `radarsim.receiver.frontend_config.FrontEndConfig`, which only the simulator reads.

@@ -98,8 +98,8 @@ class RotationConfig(Frozen):
     min_range: float = setting(0.2, "m; nearer bins are leakage", ge=0)
     limit: float = setting(300.0, "power over the noise floor at which a range-Doppler cell is limited", gt=0)
     stretch: float = setting(
-        1.0, "by how much larger sines of azimuth are taken than the array reads; what antennas of a board have of it is "
-        "measured by `radarize calibrate`, and part of the board's file", ge=1, lt=1.1
+        1.0, "by how much larger sines of azimuth are taken than the array reads; where antennas stand otherwise than "
+        "the board's file says, `radarize calibrate` measures it", ge=1, lt=1.1
     )  # fmt: skip
     contrast: float = setting(15.0, "dB over the surroundings at which a map cell is clipped", gt=0)
     cell: float = setting(0.05, "m, side of a map cell", gt=0)

@@ -1,5 +1,6 @@
 """Reading a recording, finished, growing, or left behind by a crash."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -18,6 +19,8 @@ from radarize.io.trajectory import Trajectory
 from radarize.radar.boards import Board
 from radarize.radar.config import RadarConfig
 
+#: Environment variable by which `radarize train --board` hands a board's file to all that read recordings.
+BOARD = "RADARIZE_BOARD"
 #: s, of stamps, also such as count from 1970.
 _LATEST = 1e11
 
@@ -31,6 +34,7 @@ class Recording:
     Args:
         path: an ``.h5`` file, finished, growing, or left behind by a crash.
         board: of the radar, with its calibration, instead of the recording's own: a board's file, a name, or a board.
+            By default that of the environment variable `BOARD`, if a command has set it for its jobs.
 
     Attributes:
         config: of the radar.
@@ -41,7 +45,7 @@ class Recording:
     """
 
     path: Path
-    board: str | Path | Board | None = None
+    board: str | Path | Board | None = field(default_factory=lambda: os.environ.get(BOARD))
     config: RadarConfig = field(init=False)
     times: Float[np.ndarray, "frame"] = field(init=False)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Bool, Complex64, Float, Int
+from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
 
 from radarize.io.recording import Clip
@@ -39,7 +39,7 @@ class Cells:
     range: Float[np.ndarray, "cell"]
     speed: Float[np.ndarray, "cell"]
     power: Float[np.ndarray, "cell"]
-    snapshot: Complex64[np.ndarray, "cell antenna"]
+    snapshot: Complex[np.ndarray, "cell antenna"]
 
     def __len__(self) -> int:
         return len(self.frame)

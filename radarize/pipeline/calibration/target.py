@@ -91,4 +91,4 @@ def _echo(config: RadarConfig, distance: float) -> Complex[np.ndarray, "antenna"
     middle = (out.mean(axis=0) + back.mean(axis=0)) / 2
     point = middle + np.array([distance, 0.0, 0.0])
     path = np.linalg.norm(point - out, axis=1)[:, None] + np.linalg.norm(point - back, axis=1)
-    return np.exp(-2j * np.pi / config.wavelength * (path - 2 * distance)).ravel()
+    return np.exp(2j * np.pi / config.wavelength * (path - 2 * distance)).ravel()  # the nearer, the less phase

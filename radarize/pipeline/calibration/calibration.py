@@ -152,7 +152,7 @@ def calibrate(
         >>> rz.calibrate(rec)
         Traceback (most recent call last):
         ...
-        radarize.io.errors.InputError: walk.h5: ... expected a walk of about 20 s
+        radarize.io.errors.InputError: ...walk.h5: has 414 echoes in 24 frames, expected a walk of about 20 s ...
     """
     frames = frames_of(recording)
     if not frames.recording.has_samples:

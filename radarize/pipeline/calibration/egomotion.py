@@ -32,6 +32,9 @@ _SPEED, _CLIMB, _FASTEST = 0.008, 0.15, 10.0
 #: Standard deviation of elevations, by which readings are drawn to the horizon.
 _ELEVATION = 0.4
 _ROUNDS, _SIGMAS = 20, 3.0
+#: Errors over those by which parts of a walk differ: some are alike in all of it (8 walks of 20 s, handheld and by cart,
+#: in buildings of seeds 701 to 708).
+_SHARED = 2.0
 #: Echoes of walls: power over the median cell's, purity, least range (m), largest elevation; the standard deviation of
 #: their height over the horizon, and of what counts in the fit, for many of them are the same wall's.
 _STRONG, _SINGLE, _OFF, _FLAT, _LEVEL, _ALIKE = 1e4, 0.95, 0.8, 0.3, 0.05, 0.1
@@ -169,7 +172,7 @@ def _jackknife(normal: np.ndarray, rest: np.ndarray, total: np.ndarray, sum_: np
     parts = np.array_split(np.arange(len(normal)), PARTS)
     without = [np.linalg.solve(total - normal[k].sum(axis=0), sum_ - rest[k].sum(axis=0)) for k in parts]
     formal = np.diag(np.linalg.inv(total))
-    return np.sqrt(np.maximum((PARTS - 1) * np.var(without, axis=0), formal))
+    return _SHARED * np.sqrt(np.maximum((PARTS - 1) * np.var(without, axis=0), formal))
 
 
 def _residual(cells: Cells, motion: EgoMotion, span: float) -> Float[np.ndarray, "cell"]:

@@ -5,6 +5,7 @@ a frequency shift along the chirp. Walks are through furnished rooms, and their 
 """
 
 import argparse
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -83,13 +84,18 @@ class Trial(NamedTuple):
         return recording
 
     def outcome(self, _: Report) -> dict[str, object]:
-        """Errors of the calibration, and of the trajectories with each use of the board."""
+        """Errors of the calibration, and of the trajectories with each use of the board; kept beside the recording."""
+        kept = self.path.with_suffix(".json")
+        if kept.is_file():
+            return json.loads(kept.read_text())
         with self.spoiled() as recording, Recording(self.path) as perfect:
             found = calibrate(recording)
             errors = self._errors(recording, found)
             clips = perfect[:], recording[:], recalibrated(recording[:], found.config)
             for use, clip in zip(USES, clips, strict=True):
                 errors |= dict(zip((f"odometry {use}", f"SLAM {use}"), self._follow(clip), strict=True))
+        errors = {name: value if isinstance(value, str) else float(value) for name, value in errors.items()}
+        kept.write_text(json.dumps(errors))
         return errors
 
     def _errors(self, recording: Spoiled, found: Calibration) -> dict[str, object]:
@@ -142,7 +148,7 @@ def summary(rows: Sequence[dict]) -> dict[str, object]:
 
 @script(
     "Calibration by walking",
-    folder=(Path("calibration-walks"), "of the recordings, which are made if they are not there"),
+    folder=(Path("calibration-walks"), "of recordings, made if they are not there, and of what was found of each"),
     walks=(12, "how many; their seeds count from --seed"),
     seed=(801, "of the first walk; 701 to 708 are those that settings were chosen on"),
     duration=(20.0, "of a walk, s"),

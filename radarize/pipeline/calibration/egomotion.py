@@ -32,8 +32,8 @@ _SPEED, _CLIMB, _FASTEST = 0.008, 0.15, 10.0
 #: Standard deviation of elevations, by which readings are drawn to the horizon.
 _ELEVATION = 0.4
 _ROUNDS, _SIGMAS = 20, 3.0
-#: Errors over those by which parts of a walk differ: some are alike in all of it (8 walks of 20 s, handheld and by cart,
-#: in buildings of seeds 701 to 708).
+#: Errors over those by which parts of a walk differ: some are alike in all of it (8 walks of 20 s, handheld and by
+#: cart, in buildings of seeds 701 to 708).
 _SHARED = 2.0
 #: Echoes of walls: power over the median cell's, purity, least range (m), largest elevation; the standard deviation of
 #: their height over the horizon, and of what counts in the fit, for many of them are the same wall's.

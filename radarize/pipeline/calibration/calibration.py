@@ -22,10 +22,12 @@ from radarize.pipeline.calibration.parallax import RangeBias, find_bias
 from radarize.pipeline.calibration.target import measure
 from radarize.pipeline.calibration.tracks import tracks_of
 from radarize.pipeline.odometry import estimate_odometry
-from radarize.radar.boards import SUFFIXES, Board, Mounting, load_board
+from radarize.radar.boards import BOARDS, SUFFIXES, Board, Mounting, load_board
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 
+#: Frames that are used at most: a minute at 30 frames/s, for which all is solved at once.
+_LONGEST = 1800
 #: Of a walk at least: frames that determine a velocity, and way, m. From here on a warning: way, m; turns, rad.
 _FRAMES, _WAY, _SHORT, _FEW_TURNS = 60, 1.0, 8.0, np.radians(90.0)
 #: Standard errors from which on a warning is due: phases, rad RMS; gains, dB RMS; range bias, m.
@@ -101,7 +103,9 @@ class Calibration:
         if path.suffix == ".cfg":
             # The firmware's factors are 16-bit fractions: none may exceed 1.
             factors = self.config.channel_factors / np.abs(self.config.channel_factors).max()
-            update = {"channel_calibration": _pairs(factors), "board": self.board.model_copy(update=_UNMEASURED)}
+            plain = self.board.model_copy(update=_UNMEASURED)
+            known = plain.name if BOARDS.get(plain.name) == plain else plain
+            update = {"channel_calibration": _pairs(factors), "board": known}
             text = write_cfg(self.config.model_copy(update=update))
         elif path.suffix in SUFFIXES:
             remarks = [
@@ -136,7 +140,8 @@ def calibrate(
     corner reflector straight ahead of a radar that stands still, as TI's demo does it.
 
     Args:
-        recording: a recording or a file, or a part of one. What it holds of an earlier calibration is not used.
+        recording: a recording or a file, or a part of one, of which the first 1800 frames are used. What it holds of
+            an earlier calibration is not used.
         output: board's file to write (``board.yaml``, for ``--board``), or ``radar.cfg``.
         target: distance of a corner reflector, m, straight ahead; None: a walk.
         progress: called with (frames done, frames in all).
@@ -154,7 +159,7 @@ def calibrate(
         ...
         radarize.io.errors.InputError: ...walk.h5: has 414 echoes in 24 frames, expected a walk of about 20 s ...
     """
-    frames = frames_of(recording)
+    frames = frames_of(recording)[:_LONGEST]
     if not frames.recording.has_samples:
         raise InputError(f"{frames.recording.path}: has no raw samples, expected a recording with /radar/adc")
     found = _walk(frames, progress or (lambda done, total: None)) if target is None else _reflector(frames, target)

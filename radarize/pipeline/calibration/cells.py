@@ -3,7 +3,7 @@ antennas each. The channels' errors are left in, so that whoever calibrates or c
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
@@ -25,7 +25,7 @@ class Cells:
     """Peaks of range-Doppler maps.
 
     Attributes:
-        frame: (cell,) number of the frame, ascending.
+        frame: (cell,) number of the frame, ascending; of every N-th frame, counted in these.
         time: (cell,) burst centre of the frame, s.
         range: (cell,) m, between bins, as measured: a range bias is still in it.
         speed: (cell,) closing speed between bins, m/s.
@@ -58,14 +58,16 @@ def cells_of(frames: Clip, progress: Callable[[int, int], None] = lambda done, t
     """The peaks of all frames that are whole; `progress` is called with (frames done, frames in all)."""
     source, span = frames.recording, frames.span
     signal = Signal(uncalibrated(frames.config))
-    preprocessor, size, found = Preprocessor(signal, frames.numbers.step), together(source.config), []
+    every = frames.numbers.step
+    preprocessor, size, found = Preprocessor(signal, every), together(source.config), []
     for start in range(span.start, span.stop, size):
         stop = min(start + size, span.stop)
         batch = preprocessor.process(source.adc(start, stop), source.times[start:stop], source.valid(start, stop))
         if len(batch):
             found.append(cells_of_batch(batch))
         progress(stop - span.start, len(span))
-    return joined(found, len(signal.radar.tx) * len(signal.radar.rx))
+    cells = joined(found, len(signal.radar.tx) * len(signal.radar.rx))
+    return replace(cells, frame=cells.frame // every)
 
 
 def cells_of_batch(batch: Batch) -> Cells:

@@ -71,7 +71,7 @@ def test_a_cfg_holds_factors_that_the_firmware_takes(found, tmp_path):
     ratio = config.channel_factors / found.config.channel_factors
     np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-3)
     assert config.range_bias == found.config.range_bias
-    assert "compRangeBiasAndRxChanPhase" in text
+    assert "compRangeBiasAndRxChanPhase" in text and "% Board:iwr1843boost" in text
 
 
 def test_odometry_with_the_board(spoiled, found, tmp_path):
@@ -120,6 +120,15 @@ def test_too_short_a_walk_shows_nothing(spoiled):
         rz.calibrate(spoiled.recording[:20])
     with Recording(spoiled.recording.path) as opened, pytest.raises(InputError, match="move|stands out"):
         rz.calibrate(opened, target=2.0)
+
+
+def test_every_second_frame(spoiled):
+    """Half the frame rate: tracks and turns are those of the frames that are used."""
+    found = rz.calibrate(spoiled.recording[::2])
+    leftover = (found.config.calibration * spoiled.factors).ravel()
+    assert np.degrees(centred(leftover).std()) < 2
+    assert found.values["lever_arm"].value == pytest.approx(LEVER, abs=0.06)
+    assert abs(found.values["range_bias"].value - spoiled.bias) < max(0.03, 2 * found.values["range_bias"].error)
 
 
 def test_another_output_is_refused(found, tmp_path):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.results import Data, Page, performed, script
+from radarize.evaluation.benchmark.results import UsedNetwork
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.io.alignment import trajectory
 from radarize.io.jobs import Report
@@ -21,8 +22,8 @@ from radarize.io.tum import planar_poses
 from radarize.pipeline.calibration.calibration import Calibration, calibrate, recalibrated
 from radarize.pipeline.calibration.channels import centred
 from radarize.pipeline.config import Configuration
-from radarize.pipeline.method import Inputs
-from radarize.pipeline.methods import BEST, make_pipeline
+from radarize.pipeline.method import Inputs, Weights
+from radarize.pipeline.methods import BEST, ODOMETRY, SCANS, make_pipeline
 from radarize.pipeline.session import batches
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.signal.batch import Preprocessor
@@ -35,6 +36,8 @@ PHASE, GAIN, BIAS = 30.0, 2.0, 0.2
 PLATFORMS, KINDS = ("handheld", "cart"), "ABCD"
 #: How boards are used.
 USES = ("perfect", "uncalibrated", "calibrated")
+#: Networks of the methods of choice.
+NETWORKS = (*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)
 
 
 class Spoiled(Recording):
@@ -171,6 +174,7 @@ def main(options: argparse.Namespace) -> Page:
     return Page(
         [*rows, total],
         data=Data.of("simulated walks", [trial.path for trial in trials], options.seed),
+        networks=tuple(UsedNetwork.of(Weights().of(kind)) for kind in NETWORKS),
         notes=[
             "Phases and gains: standard deviation over the 12 channels of what is left after the calibration, slopes "
             f"along the array included; phases were drawn within {PHASE:g} deg, gains within {GAIN:g} dB and range "

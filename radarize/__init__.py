@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from radarize.io.recording import Recording as Recording
     from radarize.io.trajectory import Trajectory as Trajectory
     from radarize.learning.torch_dataset import torch_dataset as torch_dataset
+    from radarize.pipeline.calibration.calibration import Calibration as Calibration
+    from radarize.pipeline.calibration.calibration import calibrate as calibrate
     from radarize.pipeline.maps import doppler_azimuth as doppler_azimuth
     from radarize.pipeline.maps import range_azimuth as range_azimuth
     from radarize.pipeline.maps import range_doppler as range_doppler
@@ -42,9 +44,11 @@ _HOMES = {
     "InputError": "io.errors",
     "Recording": "io.recording",
     "Trajectory": "io.trajectory",
+    "Calibration": "pipeline.calibration.calibration",
     "Evaluation": "evaluation.evaluation",
     "PointCloud": "pipeline.pointcloud",
     "Run": "pipeline.run",
+    "calibrate": "pipeline.calibration.calibration",
     "doppler_azimuth": "pipeline.maps",
     "estimate_odometry": "pipeline.odometry",
     "evaluate": "evaluation.evaluation",

@@ -49,6 +49,7 @@ class LiveOptions(TypedDict, total=False):
     overwrite: bool
     address: str | None
     foxglove: str | None
+    board: str | Path | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +241,7 @@ def live(
             or a YAML file of them, as ``config`` of `run`; ``baud`` of the port; ``host`` (this computer), ``dca``,
             ``command_port`` and ``data_port`` of the DCA1000; ``output``: record as well (``.h5``), ``overwrite`` one
             that is there; ``address`` (``HOST:PORT``) of a local page that shows it, ``foxglove`` of a server for
-            Foxglove.
+            Foxglove; ``board``: file of the board with its calibration, see `calibrate`.
 
     Returns:
         A session to iterate over: a `LiveFrame` for each frame that odometry uses, with pose, velocity and scan.
@@ -261,6 +262,8 @@ def live(
     if replay and (config or port):
         raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
     stream = Replay(Path(replay)) if replay else sensor(config, port, options)
+    if board := options.get("board"):
+        stream.config = stream.config.changed(str(board), board=board)
     radar = stream.config
     weights = options.get("weights")
     methods, _ = choose_methods(radar, odometry, scans, own_weights=bool(weights))

@@ -14,6 +14,9 @@ RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recordi
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
 Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
 RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
+BoardFile = Annotated[
+    Path | None, typer.Option(metavar="BOARD.yaml", help="The board with its calibration, see `radarize calibrate`.")
+]
 PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
 Baud = Annotated[int, typer.Option(help="Of the command port.")]
 Host = Annotated[str, typer.Option(help="This computer's address, which the DCA1000 sends to.")]

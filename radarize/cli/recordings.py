@@ -9,6 +9,7 @@ import typer
 from radarize.cli.app import (
     AsJson,
     Baud,
+    BoardFile,
     CommandPort,
     DataPort,
     Dca,
@@ -23,7 +24,7 @@ from radarize.cli.app import (
     tell,
     warn,
 )
-from radarize.io.console import progress, until_interrupted, working
+from radarize.io.console import print_table, progress, until_interrupted, working
 
 
 @app.command("import")
@@ -151,6 +152,7 @@ def live(
         str | None, typer.Option(metavar="HOST:PORT", help="Serve Foxglove as well, e.g. 127.0.0.1:8765.")
     ] = None,
     overwrite: Overwrite = False,
+    board: BoardFile = None,
 ) -> None:
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
     given = dict(locals())  # all options, by name
@@ -179,6 +181,31 @@ def recover(
     from radarize.io.recording import recover
 
     tell(recover(part, output))
+
+
+@app.command()
+def calibrate(
+    recording: RecordingFile,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Board's file to write (board.yaml), or the radar's .cfg.")
+    ],
+    target: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Corner reflector straight ahead at so many m; the radar stands still."),
+    ] = None,
+) -> None:
+    """Calibrate a radar from an ordinary walk of 20 s: channels, range bias, mounting. No reflector is needed.
+
+    radarize calibrate walk.h5 -o board.yaml; then radarize run other.h5 --board board.yaml -o RUN
+    """
+    from radarize.pipeline.calibration.calibration import calibrate
+
+    with progress("calibrate") as report:
+        found = calibrate(recording, output, target=target, progress=report)
+    for table in found.tables:
+        print_table(*table)
+    warn(found.warnings)
+    print(output)
 
 
 @app.command()

@@ -8,6 +8,7 @@ import typer
 from radarize.cli.app import (
     AsJson,
     Beside,
+    BoardFile,
     Reading,
     RecordingFile,
     RunPath,
@@ -33,6 +34,7 @@ def run_(
     ] = None,
     config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
     every: Annotated[int, typer.Option(min=1, help="Use every N-th frame.")] = 1,
+    board: BoardFile = None,
 ) -> None:
     """Estimate trajectory and map of a recording."""
     from radarize.io.load import load
@@ -41,7 +43,7 @@ def run_(
     from radarize.signal.effort import effort
 
     tuned = configuration(config)
-    with load(recording) as source:
+    with load(recording, board=str(board) if board else None) as source:
         words = effort(source.config, len(source)) if source.has_samples else ""
         warn([words] if words else [])
         with progress("run", f"{output} is as it was before, and so is the recording") as report:

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from radarize.cli.app import Reading, app, names
+from radarize.cli.app import BoardFile, Reading, app, names
 from radarize.io.console import print_table, progress
 from radarize.io.errors import InputError
 
@@ -35,16 +35,22 @@ def train(
         Path | None, typer.Option(help="Weights to begin with; recordings may then be of any radars.")
     ] = None,
     settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
+    board: BoardFile = None,
 ) -> None:
     """Train a network on recordings. What is not given has the default of the task.
 
     On several GPUs: torchrun --nproc-per-node 4 -m radarize.cli train ...
     """
+    import os
     from dataclasses import replace
 
+    from radarize.io.recording.reader import BOARD
     from radarize.learning.task import find_task
     from radarize.learning.training.train import TrainOptions, train
+    from radarize.radar.boards import load_board
 
+    if board:
+        os.environ[BOARD] = str(load_board(board) and board.resolve())  # for the processes that read, too
     if onnx:
         import onnxscript  # noqa: F401  missed now, not after the training
 

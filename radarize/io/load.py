@@ -86,7 +86,8 @@ def load(
         progress: called with (frames done, frames in all).
         given: what the capture does not say of itself, by the options of ``radarize import``: ``config`` (a preset, a
             ``.cfg`` or ``.mmwave.json`` file, or a `RadarConfig`), ``poses`` (true ones, a TUM file), ``samples``,
-            ``loops``, ``rx`` and ``tx`` (a count, or TI's antenna numbers as in ``"1,3,2"``), ... in SI units.
+            ``loops``, ``rx`` and ``tx`` (a count, or TI's antenna numbers as in ``"1,3,2"``), ... in SI units. Of a
+            recording, too: ``board``, a file that `calibrate` wrote.
 
     Returns:
         A recording: ``len(rec)`` frames, ``rec[100:110]`` some of them, ``rec.truth`` the true trajectory or None,
@@ -104,10 +105,10 @@ def load(
     """
     path = Path(source)
     if _is_recording(path):
-        if given or output is not None:
-            named = ", ".join([*given, *(["output"] if output is not None else [])])
-            raise InputError(f"{path}: is a recording, but {named} is given, expected no settings")
-        return Recording(path)
+        named = [name for name in given if name != "board"] + (["output"] if output is not None else [])
+        if named:
+            raise InputError(f"{path}: is a recording, but {', '.join(named)} is given, expected none but a board")
+        return Recording(path, given.get("board"))
     settings, report = _settings(given), progress or (lambda done, total: None)
     if output is not None:
         return Recording(import_recording(path, Path(output), settings, report))

@@ -120,7 +120,7 @@ class DopplerVelocity:
         spectrum = batch.spectrum
         power = self._heatmaps.beamformed(spectrum, self.row, self._steering).numpy()
         frames = zip(spectrum.numpy(), power, batch.aliases, strict=True)
-        found = [self._solve(self._echoes(*frame)) for frame in frames]
+        found = [self.solve(self._echoes(*frame)) for frame in frames]
         velocity, covariance, inliers = map(np.array, zip(*found, strict=True))
         seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
         doubt = 1 + (self.settings.few / inliers[seen]) ** 4
@@ -151,7 +151,8 @@ class DopplerVelocity:
         echoes[:, 5] /= max(level, 1e-12)
         return echoes
 
-    def _solve(self, echoes: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    def solve(self, echoes: Float[np.ndarray, "echo 6"]) -> tuple[np.ndarray, np.ndarray, int]:
+        """Velocity (2,) m/s, its covariance (2, 2) and the number of agreeing echoes, by a frame's `echoes`."""
         s = self.settings
         # Without elevation pairs no echo tells of the climb.
         climb = s.climb if self.pairs is not None else 1e-3

@@ -98,8 +98,8 @@ class RotationConfig(Frozen):
     min_range: float = setting(0.2, "m; nearer bins are leakage", ge=0)
     limit: float = setting(300.0, "power over the noise floor at which a range-Doppler cell is limited", gt=0)
     stretch: float = setting(
-        1.025, "by how much larger sines of azimuth are taken than the array reads; chosen on 18 walks: heading over "
-        "50 s is off by 8.2 deg by hand and 2.5 deg by cart instead of 12.9 and 5.7 deg", ge=1, lt=1.1
+        1.0, "by how much larger sines of azimuth are taken than the array reads; where antennas stand otherwise than "
+        "the board's file says, `radarize calibrate` measures it", ge=1, lt=1.1
     )  # fmt: skip
     contrast: float = setting(15.0, "dB over the surroundings at which a map cell is clipped", gt=0)
     cell: float = setting(0.05, "m, side of a map cell", gt=0)

@@ -101,7 +101,6 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
         tx_order, repeats = distinct_order(order, where)
     start_frequency = profile.decimal("startFreq", 9)
     samples = profile.integer("numAdcSamples", 2 if real else 1)
-    bias, calibration = _calibration(last)
     return RadarConfig.build(
         name,
         board=_board(text, name) or likely_board(start_frequency),
@@ -123,10 +122,9 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
             HIGH_PASS_2[profile.integer("hpfCornerFreq2", 0, 3)],
         ),
         iq_order="real" if real else "qqii" if swap else "iiqq",
-        range_bias=bias,
-        channel_calibration=calibration,
         loop_idle_time=_loop_idle_time(text),
         bpm=bpm,
+        **_calibration(last),
     )
 
 
@@ -293,8 +291,8 @@ def _backoff(profile: Command, tx_order: tuple[Firing, ...]) -> float:
     return steps.pop()
 
 
-def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, float], ...] | None]:
-    """Range bias, m, and factors of all the board's channels; None: not measured."""
+def _calibration(last: dict[str, Command]) -> dict[str, Any]:
+    """What was measured; nothing where the file holds what TI's hold before anybody has."""
     factors: list[complex] = []
     bias = 0.0
     if command := last.get("compRangeBiasAndRxChanPhase"):
@@ -307,7 +305,9 @@ def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, fl
         if len(factors) != len(signs):
             raise command.error("rotation0", f"a sign for each of the {len(factors)} channels that are calibrated")
         factors = [s * f for s, f in zip(signs, factors, strict=True)]
-    return bias, tuple((f.real, f.imag) for f in factors) or None
+    pairs = tuple((f.real, f.imag) for f in factors)
+    measured = bias or set(pairs) - {(1.0, 0.0)}
+    return ({"channel_calibration": pairs} if pairs else {}) | ({"range_bias": bias} if measured else {})
 
 
 # --- writing ----------------------------------------------------------------------------------------------------------

@@ -68,9 +68,10 @@ class RadarConfig(BaseModel):
         high_pass: corner frequencies of the two high-pass stages, Hz.
         iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo); or
             ``"real"``: twice as many real samples at twice the rate, of which the complex ones are made.
-        range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
+        range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``); the board's,
+            unless given.
         channel_calibration: measured complex factor per *physical* (tx, rx) of the board as (re, im) pairs: TX1 x RX1,
-            RX2, ..., then TX2, ... None: not measured, and the board's nominal one applies, which takes its antennas'
+            RX2, ..., then TX2, ... None: the board's applies: measured, or the nominal one, which takes its antennas'
             signs off. Ones, which TI's files hold before anybody has measured, count as None.
     """
 
@@ -107,6 +108,16 @@ class RadarConfig(BaseModel):
         if info.mode == "json" or not str(board).endswith(SUFFIXES):  # a recording names no files
             raise ValueError(f"expected {expected()}")
         return load_board(board)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bias_of_board(cls, fields: Any, info: ValidationInfo) -> Any:
+        if not isinstance(fields, dict) or "range_bias" in fields or info.mode == "json":
+            return fields
+        try:
+            return {**fields, "range_bias": load_board(fields["board"]).range_bias} if "board" in fields else fields
+        except (InputError, TypeError):
+            return fields  # the field's own validator says what is wrong
 
     @field_validator("channel_calibration")
     @classmethod
@@ -176,15 +187,20 @@ class RadarConfig(BaseModel):
     def changed(self, source: str, **fields: Any) -> "RadarConfig":
         """The radar with some fields changed; `source` is what errors name as their origin.
 
-        A calibration was measured on one board: on another, the other's nominal one applies unless one is given.
+        A calibration was measured on one board: on another, the other's applies unless one is given, and so does the
+        range bias of a board that was measured.
 
         Raises:
             InputError: as `build`.
         """
         found = RadarConfig.build(source, **{**self.model_dump(), **fields})
-        if "channel_calibration" in fields or load_board(found.board) == load_board(self.board):
+        board, before = load_board(found.board), load_board(self.board)
+        if board == before:
             return found
-        return found.model_copy(update={"channel_calibration": None})
+        measured: dict[str, Any] = {"channel_calibration": None}
+        if board.calibration or before.calibration:
+            measured["range_bias"] = board.range_bias
+        return found.model_copy(update={name: each for name, each in measured.items() if name not in fields})
 
     # --- array -----------------------------------------------------------------------------------------------------
     @property
@@ -323,7 +339,7 @@ class RadarConfig(BaseModel):
 
     @property
     def channel_factors(self) -> Complex[np.ndarray, "tx rx"]:
-        """The same of all the board's (tx, rx): measured, or its nominal ones."""
+        """The same of all the board's (tx, rx): measured, or the board's."""
         board = load_board(self.board)
-        pairs = self.channel_calibration or board.nominal_calibration
+        pairs = self.channel_calibration or board.factors
         return np.array([complex(*pair) for pair in pairs]).reshape(len(board.tx), len(board.rx))

@@ -38,7 +38,12 @@ def of_fields(kind: type) -> dict[str, object]:
 
 #: Command: its function, further options of that with their defaults, and what only the command has, and why.
 PAIRS = {
-    "radarize run": (rz.run, {}, {"every": "frames are sliced: rec[::2]"}),
+    "radarize run": (
+        rz.run,
+        {},
+        {"every": "frames are sliced: rec[::2]", "board": "recordings are opened with it: rz.load(rec, board=...)"},
+    ),
+    "radarize calibrate": (rz.calibrate, {}, {}),
     "radarize evaluate": (rz.evaluate, {}, {"beside": "one table of several", "as_json": "how it is printed"}),
     "radarize import": (rz.load, dict.fromkeys(CaptureOptions.__annotations__) | of_fields(Given), {}),
     "radarize live": (
@@ -52,6 +57,7 @@ PAIRS = {
             "overwrite": False,
             "address": None,
             "foxglove": None,
+            "board": None,
         },
         {},
     ),
@@ -60,6 +66,7 @@ PAIRS = {
 #: What a command takes where nothing is said, and the function does not, and why.
 OTHERWISE = {
     ("radarize import", "output"): "a command leaves a file",
+    ("radarize calibrate", "output"): "a command leaves a file",
     ("radarize run", "output"): "a command leaves a folder",
     ("radarsim simulate", "output"): "a command leaves a file",
     ("radarize live", "address"): "a command shows a page",

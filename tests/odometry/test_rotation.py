@@ -38,7 +38,7 @@ def see(rotation: MapRotation, poses: np.ndarray, rng: np.random.Generator) -> n
 
 def follow(times: np.ndarray, poses: np.ndarray, prior=None, settings=None) -> Rotations:
     """What `MapRotation` makes of frames at true poses whose velocities are known."""
-    rotation = MapRotation(SIGNAL.heatmaps, settings, prior)
+    rotation = MapRotation(SIGNAL.heatmaps, settings or RotationConfig(stretch=SHORT), prior)
     rotation.features = lambda poses: see(rotation, poses, np.random.default_rng(1))
     rotation.echoes = lambda poses: [[]] * len(poses)
     velocity = np.gradient(poses[:, :2], times, axis=0)

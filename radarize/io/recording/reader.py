@@ -1,5 +1,6 @@
 """Reading a recording, finished, growing, or left behind by a crash."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -16,7 +17,11 @@ from radarize.io.recording.growing import GrowingFile, is_growing
 from radarize.io.recording.stamps import Stamps
 from radarize.io.recording.unpacking import Rows
 from radarize.io.trajectory import Trajectory
+from radarize.radar.boards import Board
 from radarize.radar.config import RadarConfig
+
+#: Environment variable by which `radarize train --board` hands a board's file to all that read recordings.
+BOARD = "RADARIZE_BOARD"
 
 
 @dataclass(eq=False, repr=False)
@@ -29,6 +34,8 @@ class Recording:
 
     Args:
         path: an ``.h5`` file, finished, growing, or left behind by a crash.
+        board: of the radar, with its calibration, instead of the recording's own: a board's file, a name, or a board.
+            By default that of the environment variable `BOARD`, if a command has set it for its jobs.
 
     Attributes:
         config: of the radar.
@@ -39,6 +46,7 @@ class Recording:
     """
 
     path: Path
+    board: str | Path | Board | None = field(default_factory=lambda: os.environ.get(BOARD))
     config: RadarConfig = field(init=False)
     times: Float[np.ndarray, "frame"] = field(init=False)
 
@@ -51,6 +59,8 @@ class Recording:
                 self.file = stack.enter_context(open_hdf5(self.path, growing))
             with explained(f"{self.path}: not a recording of this project"):
                 self._look(growing is not None)
+            if self.board is not None:
+                self.config = self.config.changed(str(self.board), board=self.board)
             self._files = stack.pop_all()
 
     def _look(self, growing: bool) -> None:

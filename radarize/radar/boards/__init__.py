@@ -26,6 +26,25 @@ SUFFIXES = (".yaml", ".yml")
 Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
 Place = tuple[Coordinate, Coordinate]
 Sign = Literal[-1, 1]
+Part = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class Mounting(Frozen):
+    """Where the sensor sits on its carrier, each value as far as a walk showed it, else None.
+
+    Attributes:
+        height: over the floor, m.
+        lever_arm: ahead of the carrier's axle, m.
+        yaw: of the sensor to the carrier's way ahead, rad, positive to the left.
+        tilt: by how much the front is raised, rad.
+        lean: by how much the left side is raised, rad.
+    """
+
+    height: float | None = None
+    lever_arm: float | None = None
+    yaw: float | None = None
+    tilt: float | None = None
+    lean: float | None = None
 
 
 def _in_phase(antennas: tuple[Place, ...]) -> tuple[Sign, ...]:
@@ -45,6 +64,10 @@ class Board(Frozen):
         tx_sign, rx_sign: -1 for antennas fed from the opposite side of the patch, whose signal is turned by 180 deg.
             Default: none are.
         platforms: other names by which configurations call this very board (``% Platform:``, ``mmWaveDevice``).
+        calibration: measured factor per physical (tx, rx) as (re, im) pairs, to be multiplied onto samples, signs of
+            the antennas included; None: not measured.
+        range_bias: m, measured ranges less the true ones.
+        mounting: of the sensor; None: not measured. For the reader: nothing is computed from it.
         front_end: fields of `radarsim.receiver.frontend_config.FrontEndConfig`, which only the simulator reads.
     """
 
@@ -57,6 +80,9 @@ class Board(Frozen):
     tx_sign: tuple[Sign, ...] = Field(default_factory=lambda fields: _in_phase(fields.get("tx", ())))
     rx_sign: tuple[Sign, ...] = Field(default_factory=lambda fields: _in_phase(fields.get("rx", ())))
     platforms: tuple[str, ...] = ()
+    calibration: tuple[tuple[Part, Part], ...] | None = None
+    range_bias: float = Field(0.0, ge=-1000, le=1000)
+    mounting: Mounting | None = None
     front_end: dict[str, Any]
 
     @field_validator("chip")
@@ -71,6 +97,11 @@ class Board(Frozen):
         for name, antennas in (("tx_sign", self.tx), ("rx_sign", self.rx)):
             if len(signs := getattr(self, name)) != len(antennas):
                 raise ValueError(f"{name} has {len(signs)} entries, expected one for each of {len(antennas)} antennas")
+        channels = len(self.tx) * len(self.rx)
+        if self.calibration is not None and len(self.calibration) != channels:
+            raise ValueError(
+                f"calibration has {len(self.calibration)} entries, expected one for each of {channels} channels"
+            )
         return self
 
     @field_validator("front_end", mode="before")
@@ -91,6 +122,11 @@ class Board(Frozen):
     def nominal_calibration(self) -> tuple[tuple[float, float], ...]:
         """Factor per physical (tx, rx) as (re, im) pairs that takes the channels' signs off again."""
         return tuple((float(sign), 0.0) for sign in self.signs.ravel())
+
+    @property
+    def factors(self) -> tuple[tuple[float, float], ...]:
+        """The measured factors, or the nominal ones."""
+        return self.calibration or self.nominal_calibration
 
     def __str__(self) -> str:
         return self.name

@@ -297,8 +297,9 @@ def _calibration(last: dict[str, Command]) -> dict[str, Any]:
     bias = 0.0
     if command := last.get("compRangeBiasAndRxChanPhase"):
         bias = command.decimal("rangeBias")
-        pairs = range(len(command.fields) // 2)
-        factors = [complex(command.decimal(f"re{i}"), command.decimal(f"im{i}")) for i in pairs]
+        factors = [
+            complex(command.decimal(f"re{i}"), command.decimal(f"im{i}")) for i in range(len(command.fields) // 2)
+        ]
     if command := last.get("antPhaseRot"):  # people-counting firmware: signs of the receivers' feeds
         signs = [command.require(field, (-1, 1), "in or out of phase") for field in command.fields]
         factors = factors or [1 + 0j] * len(signs)

@@ -81,7 +81,8 @@ class BagWriter:
                 topic, kind, typestore=_TYPES, offered_qos_profiles=latched
             )
         for each in getattr(content, "transforms", [content]) if self._later else ():
-            stamp = each.header.stamp
+            stamp, frame = each.header.stamp, each.header.frame_id  # messages may share a header: each gets its own
+            each.header = header(0.0, frame)
             seconds, nanoseconds = divmod(stamp.sec * 10**9 + stamp.nanosec + self._later, 10**9)
             each.header.stamp = message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
         received = round(1e9 * time) + self._later

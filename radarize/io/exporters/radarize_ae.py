@@ -33,7 +33,7 @@ from radarize.io.importers.rosbag import FRAME_DEFINITION, FRAME_TYPE
 from radarize.io.recording import Recording
 from radarize.io.replacing import replacing
 from radarize.radar.cfg import cfg_headers
-from radarize.radar.config import RadarConfig
+from radarize.radar.config import RadarConfig, fired
 from radarize.radar.dca1000 import encode
 from radarize.signal.points import PointClouds
 
@@ -119,6 +119,7 @@ def _frames(recording: Recording) -> Iterator[Event]:
 def _parameters(config: RadarConfig) -> dict[str, Any]:
     """Fields of all frames, as xwr_raw_ros computes them of a configuration."""
     loops, tx, rx, samples, _ = config.frame_shape
+    enabled = sorted({transmitter for firing in config.tx for transmitter in fired(firing)})
     chirp = config.idle_time + config.ramp_end_time
     velocity_max = _LIGHT / config.start_frequency / (4 * chirp)
     range_max = config.sample_rate * _LIGHT / (2 * config.slope)
@@ -136,7 +137,7 @@ def _parameters(config: RadarConfig) -> dict[str, Any]:
         "range_max": range_max,
         "range_res": range_max / samples,
         "rx": np.isin(np.arange(max(config.rx) + 1), config.rx).astype(np.uint8),
-        "tx": np.isin(np.arange(max(config.tx) + 1), config.tx).astype(np.uint8),
+        "tx": np.isin(np.arange(max(enabled) + 1), enabled).astype(np.uint8),
         "shape": np.array([loops * tx, rx, samples], np.uint32),
     }
 

@@ -26,7 +26,7 @@ from radarize.io.jsonfile import parse_json
 from radarize.io.npyfile import read_npz
 from radarize.io.recording import Product
 from radarize.io.yamlfile import read_yaml
-from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
 from radarize.radar.dca1000 import check_layout, decode
 
 #: Transmitters that fire, one after the other: with two, the raised one in the middle of the row is left out.
@@ -195,8 +195,9 @@ def _fired(path: Path, told: dict[str, Any], config: RadarConfig) -> RadarConfig
     order = told.get("tx_order")
     if order is None or len(config.tx_order) != len(set(config.tx)):
         return config
-    if not isinstance(order, list) or sorted(map(str, order)) != [str(tx + 1) for tx in config.tx]:
-        raise InputError(f"{path}: tx_order is {str(order)[:40]}, expected {[tx + 1 for tx in config.tx]} in any order")
+    names = [fired(tx)[0] + 1 for tx in config.tx]
+    if not isinstance(order, list) or sorted(map(str, order)) != [str(name) for name in names]:
+        raise InputError(f"{path}: tx_order is {str(order)[:40]}, expected {names} in any order")
     return config.changed(str(path), tx_order=tuple(int(tx) - 1 for tx in order))
 
 

@@ -219,6 +219,16 @@ def test_stamps_near_zero_are_moved(recording, tmp_path):
         assert found["/tf_static"][0][1].transforms[0].header.stamp.sec == int(later)
 
 
+def test_stamps_of_all_topics_are_moved_once(bag, recording, run, tmp_path):
+    found = read(export(recording, "ros2", tmp_path / "moved", run=run, time_offset=7.25))
+    assert found.keys() == bag.keys()
+    for topic, messages in found.items():
+        assert [time - 7.25 for time, _ in messages] == pytest.approx([time for time, _ in bag[topic]], abs=1e-6)
+        for time, message in messages:
+            for each in getattr(message, "transforms", [message]):
+                assert stamp(each) == pytest.approx(time, abs=1e-6)
+
+
 def test_heat_map_is_the_pipelines(bag, recording):
     maps = Heatmaps(CONFIG)
     with Recording(recording) as source:

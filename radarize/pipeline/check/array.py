@@ -1,0 +1,154 @@
+"""Faults of which antenna is which: order of transmitters and of receivers, and the board.
+
+An echo is a plane wave over the virtual array. If antennas are taken for one another it is none, and no direction
+explains what the channels read: in furnished rooms a third to a half of the cells are single plane waves (90 % of their
+power) by the right array, half as many at most by any other one. The test pairs cells: each is explained better or
+worse by another array than by the one of the configuration.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from radarize.io.errors import InputError
+from radarize.pipeline.check.evidence import Evidence
+from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.levels import sureness
+from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
+from radarize.radar.boards import BOARDS, load_board
+from radarize.radar.config import RadarConfig
+
+#: Standard deviations by which another array must explain the cells better; cells, and frames, that are needed.
+_SIGMAS, _CELLS, _FRAMES = 6.0, 150, 8
+#: Share of cells that are plane waves by the better array at least, and by what factor more than by the configured one.
+_SHARE, _MORE = 0.08, 1.25
+#: Purity of a plane wave; exponent that lets nearly pure cells count.
+_PURE, _SHARP = 0.9, 8
+#: Standard deviation of direction cosines upward below which nothing is seen above or below: 0.1 to 0.3 in rooms.
+_LEVEL = 0.03
+#: GHz: bands in which boards are taken for one another.
+_BAND = 70e9
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Another array.
+
+    Attributes:
+        kind: of the fault that it would be.
+        words: what would be wrong.
+        remedy: what would mend it.
+        reading: of the channels.
+        mending: of the samples.
+    """
+
+    kind: str
+    words: str
+    remedy: str
+    reading: Reading
+    mending: Mending
+
+
+def candidates(config: RadarConfig) -> Iterator[Candidate]:
+    """All arrays that the configured one may be mistaken for."""
+    names = [f"TX{t + 1}" for t in config.tx]
+    for order in [each for each in permutations(range(len(config.tx))) if list(each) != sorted(each)]:
+        inverse = list(np.argsort(order))
+        slots = [config.slot[k] for k in inverse]  # of physical transmitters, if chirps stayed where they are
+        fired = tuple(config.tx[k] for k in np.argsort(slots))
+        tx = ",".join(str(t + 1) for t in fired)
+        change = Mending(config.model_copy(update={"tx_order": fired}), _taken(2, inverse))
+        held = ", ".join(f"{names[order[k]]} in place of {names[k]}" for k in range(len(order)) if order[k] != k)
+        yield Candidate(
+            "transmitter order",
+            held,
+            f"import it with --tx {tx}, the order of firing",
+            Reading.of(config, tx=order),
+            change,
+        )
+        yield Candidate(
+            "transmitter order", held, "reorder the transmitters' axis", Reading.of(config, tx=order, moved=True),
+            Mending(samples=_taken(2, inverse)),
+        )  # fmt: skip
+    for order in [each for each in permutations(range(len(config.rx))) if list(each) != sorted(each)]:
+        held = ", ".join(
+            f"RX{config.rx[order[k]] + 1} in place of RX{config.rx[k] + 1}" for k in range(len(order)) if order[k] != k
+        )
+        mending = Mending(samples=_taken(3, list(np.argsort(order))))
+        yield Candidate("receiver order", held, "reorder the receivers' axis", Reading.of(config, rx=order), mending)
+    band = config.start_frequency > _BAND
+    for name, board in BOARDS.items():
+        if (board.design_frequency > _BAND) != band or _alike(config, name):
+            continue
+        try:
+            other = config.changed("check", board=name)
+        except InputError:
+            continue
+        words = f"channels fit the {name}, not the {load_board(config.board)}"
+        yield Candidate("board", words, f"import it with --board {name}", Reading.of(other), Mending(other))
+
+
+def _taken(axis: int, order: list[int]):
+    return lambda frames: np.ascontiguousarray(np.take(frames, order, axis=axis))
+
+
+def _alike(config: RadarConfig, name: str) -> bool:
+    one, other = load_board(config.board), load_board(name)
+    return (one.tx, one.rx, one.rx_sign) == (other.tx, other.rx, other.rx_sign)
+
+
+def plane_waves(evidence: Evidence) -> PlaneWaves:
+    """Of the evidence's cells by its configuration.
+
+    Raises:
+        NotObservable: there are too few channels, frames or cells.
+    """
+    config = evidence.config
+    if len(config.tx) * len(config.rx) < 4:
+        raise NotObservable(f"{len(config.tx) * len(config.rx)} channels are plane waves in any order")
+    frames = len(np.unique(evidence.cells.frame))
+    if frames < _FRAMES:
+        raise NotObservable(f"{frames} frames have echoes, {_FRAMES} are needed")
+    if len(evidence.cells.speed) < _CELLS:
+        raise NotObservable(f"{len(evidence.cells.speed)} echoes are seen, {_CELLS} are needed")
+    return evidence.waves
+
+
+def antennas(evidence: Evidence) -> Iterator[Finding]:
+    """Antennas stand elsewhere than the configuration says."""
+    here = plane_waves(evidence)
+    cells = evidence.cells
+    best, margin, pure = None, -np.inf, 0.0
+    for candidate in candidates(evidence.config):
+        waves = fit_plane_waves(cells, candidate.reading)
+        better = waves.purity**_SHARP - here.purity**_SHARP
+        sigmas = float(better.mean() / (better.std() + 1e-9) * np.sqrt(len(better)))
+        if sigmas > margin:
+            best, margin, pure = candidate, sigmas, float((waves.purity > _PURE).mean())
+    now = float((here.purity > _PURE).mean())
+    if best is None or max(now, pure) < _SHARE:
+        raise NotObservable(f"{max(now, pure):.0%} of the echoes are plane waves by any array, {_SHARE:.0%} are needed")
+    if margin > _SIGMAS and pure > _MORE * now:
+        yield Finding(
+            best.kind, f"{pure:.0%} of {len(cells.speed)} echoes are plane waves with {best.words}, {now:.0%} as configured",
+            sureness(margin, _SIGMAS), best.remedy, best.mending, hides=True,
+        )  # fmt: skip
+
+
+def elevation(evidence: Evidence) -> Iterator[Finding]:
+    """An array with antennas at two heights sees everything at its own height."""
+    waves = plane_waves(evidence)
+    if not np.ptp(evidence.reading.places[..., 1]):
+        raise NotObservable("all antennas are at one height")
+    pure = waves.purity > _PURE
+    if pure.sum() < _CELLS / 3:
+        raise NotObservable(f"{pure.sum()} echoes are plane waves, {_CELLS // 3} are needed")
+    spread = float(waves.direction[pure, 1].std())
+    if spread < _LEVEL:
+        yield Finding(
+            "elevation missing", f"directions upward of {pure.sum()} echoes have a standard deviation of {spread:.3f}",
+            sureness(_LEVEL / max(spread, 1e-3), 1.0),
+            "look at the board's file: its antennas may all be at one height (--board)",
+        )  # fmt: skip

@@ -1,0 +1,109 @@
+"""Check a recording: the faults that its samples show."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from radarize.io.errors import InputError
+from radarize.io.load import Source, frames_of
+from radarize.pipeline.check.evidence import Evidence
+from radarize.pipeline.check.faults import TESTS
+from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a check found.
+
+    Attributes:
+        findings: faults, in the order of the tests.
+        not_observable: kinds of faults that the recording would not show, and why.
+    """
+
+    findings: tuple[Finding, ...]
+    not_observable: dict[str, str]
+
+    @property
+    def well(self) -> bool:
+        """Nothing was found."""
+        return not self.findings
+
+    @property
+    def mendings(self) -> list[Mending]:
+        """What mends what can be mended, in the order in which it must be done."""
+        return [each.mending for each in self.findings if each.mending is not None]
+
+    def warnings(self) -> list[str]:
+        """A sentence on each finding."""
+        return [str(each) for each in self.findings]
+
+    def to_json(self) -> str:
+        """All of it as JSON."""
+        found = {
+            "well": self.well, "findings": [each.row() for each in self.findings], "not_observable": self.not_observable
+        }  # fmt: skip
+        return json.dumps(found, indent=2)
+
+    def __str__(self) -> str:
+        told = self.warnings() or ["no fault found"]
+        return "\n".join([*told, *(f"not observable: {kind}: {why}" for kind, why in self.not_observable.items())])
+
+
+def check(recording: Source, fix: str | Path | None = None) -> Check:
+    """Find what is wrong with a recording, from the samples of a walk.
+
+    In a static world, Doppler, range and the phases over antennas and chirps are bound to each other. So ten seconds of
+    a moving radar show whether I and Q, transmitters, receivers, chirps, frames and stamps are what the configuration
+    says. What cannot be seen, such as left and right without an IMU or true poses, is listed with the reason.
+
+    Args:
+        recording: a recording or a file, or frames of one such as ``rec[:300]``.
+        fix: recording to write (``.h5``) in which all is mended that reordering, exchange or another configuration
+            mends; a board's file (``.yaml``) if that is what is wrong.
+
+    Returns:
+        ``.findings`` (kind, what was measured, how sure, remedy), ``.not_observable`` (why by kind), ``.well``.
+
+    Raises:
+        InputError: an unusable recording, one without samples, or nothing to be mended with `fix`.
+
+    Example:
+        >>> rz.check(rec).well
+        True
+    """
+    frames = frames_of(recording)
+    if not frames.recording.has_samples:
+        raise InputError(f"{frames.recording.path}: has no raw samples, expected a recording with /radar/adc")
+    if not len(frames):
+        raise InputError(f"{frames.recording.path}: has no whole frame, expected at least one")
+    found = check_evidence(Evidence.of(frames))
+    if fix is not None:
+        from radarize.pipeline.check.mending import write_mended
+
+        write_mended(frames, found, Path(fix))
+    return found
+
+
+def check_evidence(evidence: Evidence) -> Check:
+    """All tests on evidence. What spoils others is mended for those that follow; if it cannot be, they do not follow."""
+    findings: list[Finding] = []
+    unseen: dict[str, str] = {}
+    blocked, still = "", False
+    for test in TESTS:
+        why = blocked or ("the radar hardly moves" if still and test.moving else "")
+        if why:
+            unseen.update(dict.fromkeys(test.kinds, why))
+            continue
+        try:
+            found = list(test.find(evidence))
+        except NotObservable as reason:
+            unseen.update(dict.fromkeys(test.kinds, str(reason)))
+            continue
+        findings += found
+        for each in found:
+            still |= each.kind == "no motion"
+            if each.mending is not None:
+                evidence = evidence.mended(each.mending)
+            elif each.hides:
+                blocked = f"hidden by: {each.kind}"
+    return Check(tuple(findings), unseen)

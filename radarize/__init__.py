@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from radarize.io.recording import Recording as Recording
     from radarize.io.trajectory import Trajectory as Trajectory
     from radarize.learning.torch_dataset import torch_dataset as torch_dataset
+    from radarize.pipeline.check.check import Check as Check
+    from radarize.pipeline.check.check import check as check
     from radarize.pipeline.maps import doppler_azimuth as doppler_azimuth
     from radarize.pipeline.maps import range_azimuth as range_azimuth
     from radarize.pipeline.maps import range_doppler as range_doppler
@@ -45,6 +47,8 @@ _HOMES = {
     "Evaluation": "evaluation.evaluation",
     "PointCloud": "pipeline.pointcloud",
     "Run": "pipeline.run",
+    "Check": "pipeline.check.check",
+    "check": "pipeline.check.check",
     "doppler_azimuth": "pipeline.maps",
     "estimate_odometry": "pipeline.odometry",
     "evaluate": "evaluation.evaluation",

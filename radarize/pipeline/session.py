@@ -5,6 +5,7 @@ from pathlib import Path
 
 from radarize.io.errors import InputError
 from radarize.io.recording import Clip
+from radarize.pipeline.check.check import warnings_before
 from radarize.pipeline.config import Configuration
 from radarize.pipeline.method import Inputs, Weights
 from radarize.pipeline.methods import make_pipeline
@@ -44,14 +45,14 @@ def run_recording(
         make_pipeline(inputs, methods["odometry"], methods["scans"]),
         Preprocessor(inputs.signal, inputs.every),
     )
-    source = frames.recording
+    source, warnings = frames.recording, warnings_before(frames)
     with RunWriter(folder, source.config) as writer:
         for result in pipeline.run(batches(frames, preprocessor, progress)):
             writer.add(result)
         if preprocessor.lost == preprocessor.taken:
             lost = f"all its {preprocessor.taken} frames are lost or silent"
             raise InputError(f"{source.path}: {lost}, expected one with samples")
-        writer.describe(frames, inputs.signal.heatmaps)
+        writer.describe(frames, inputs.signal.heatmaps, warnings)
         made = {**methods, **(facts or {})}
         if frames.numbers.step > 1:
             made["frames"] = f"one of {frames.numbers.step}"

@@ -64,7 +64,7 @@ def find_snapshots(
 def range_doppler(
     samples: Int16[np.ndarray, "loop tx rx sample 2"], valid: Bool[np.ndarray, "loop tx"] | None = None
 ) -> Complex64[np.ndarray, "doppler tx rx range"]:
-    """Spectrum of one frame, closing speeds ascending with zero in the middle; Hann over samples, Hamming over loops."""
+    """Spectrum of one frame, closing speeds ascending, zero in the middle; Hann over samples, Hamming over loops."""
     signal = np.ascontiguousarray(samples, np.float32).view(np.complex64)[..., 0]
     loops, count = signal.shape[0], signal.shape[-1]
     window, over_loops = np.hanning(count).astype(np.float32), np.hamming(loops).astype(np.float32)

@@ -3,12 +3,14 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 from radarize.io.errors import InputError
 from radarize.io.load import Source, frames_of
+from radarize.io.recording import Clip, Recording
 from radarize.pipeline.check.evidence import Evidence
 from radarize.pipeline.check.faults import TESTS
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Finding, NotObservable
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,6 @@ class Check:
     def well(self) -> bool:
         """Nothing was found."""
         return not self.findings
-
-    @property
-    def mendings(self) -> list[Mending]:
-        """What mends what can be mended, in the order in which it must be done."""
-        return [each.mending for each in self.findings if each.mending is not None]
 
     def warnings(self) -> list[str]:
         """A sentence on each finding."""
@@ -80,12 +77,33 @@ def check(recording: Source, fix: str | Path | None = None) -> Check:
     if fix is not None:
         from radarize.pipeline.check.mending import write_mended
 
-        write_mended(frames, found, Path(fix))
+        write_mended(frames, found.findings, Path(fix))
     return found
 
 
+def warnings_before(frames: Clip) -> list[str]:
+    """A sentence on each fault of the recording that frames are of, for those who are about to use it.
+
+    Asked again of the same open recording, it is not checked again.
+    """
+    recording, span = frames.recording, frames.span
+    if not recording.has_samples or not len(frames):
+        return []
+    known = _CHECKED.setdefault(recording, {})
+    if span not in known:
+        known[span] = check_evidence(Evidence.of(recording[span.start : span.stop])).warnings()
+    return known[span]
+
+
+#: What was found in open recordings, by the span of frames.
+_CHECKED: WeakKeyDictionary[Recording, dict[range, list[str]]] = WeakKeyDictionary()
+
+
 def check_evidence(evidence: Evidence) -> Check:
-    """All tests on evidence. What spoils others is mended for those that follow; if it cannot be, they do not follow."""
+    """All tests on evidence.
+
+    What hides others is mended for the tests that follow; if it cannot be, these are not made.
+    """
     findings: list[Finding] = []
     unseen: dict[str, str] = {}
     blocked, still = "", False

@@ -44,8 +44,8 @@ def leakage(evidence: Evidence) -> Iterator[Finding]:
     away = float(place * config.range_resolution - config.range_bias)
     if not _LEAKS[0] < away < _LEAKS[1]:
         yield Finding(
-            "range bias", f"leakage from the transmitters is at {away:.2f} m, expected within {_LEAKS[0]} to {_LEAKS[1]} m",
-            sureness(abs(away - np.mean(_LEAKS)), np.ptp(_LEAKS) / 2),
+            "range bias", f"leakage of the transmitters is at {away:.2f} m, expected from {_LEAKS[0]} to {_LEAKS[1]} m",
+            sureness(abs(away - sum(_LEAKS) / 2), (_LEAKS[1] - _LEAKS[0]) / 2),
             f"set the range bias to about {config.range_bias + away - 0.06:.2f} m (compRangeBiasAndRxChanPhase), see "
             "`radarize calibrate`",
         )  # fmt: skip

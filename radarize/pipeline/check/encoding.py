@@ -65,7 +65,7 @@ def readings(config: RadarConfig) -> dict[str, tuple[str, Reading]]:
         found.pop("layout", None)
     if tx > 1 and loops > 1:
         found["loops and chirps"] = (
-            "give --shape with the transmitter before the loop: all chirps of one come first", transmitter_by_transmitter
+            "give --shape with tx before loop: all chirps of a transmitter come first", transmitter_by_transmitter
         )  # fmt: skip
     return found
 

@@ -9,12 +9,13 @@ import numpy as np
 import scipy.fft
 from jaxtyping import Bool, Complex64, Float, Float32, Int, Int16
 
+from radarize.io.errors import InputError
 from radarize.io.recording import Clip
 from radarize.io.trajectory import Trajectory
 from radarize.odometry.inertial import Imu
 from radarize.pipeline.check.finding import Mending
-from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.pipeline.check.motion import Motions, find_motions
+from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.pipeline.check.tracks import Tracks, find_tracks
 from radarize.radar.config import RadarConfig
 from radarize.signal.snapshots import NEAREST, Snapshots, find_snapshots
@@ -52,6 +53,7 @@ class Evidence:
         read: called with (start, stop), returns those frames.
         truth: true poses, where they are known.
         imu: where there is one.
+        numbers: of the frames in the recording; from 0 if None.
     """
 
     def __init__(
@@ -62,7 +64,9 @@ class Evidence:
         read: Callable[[int, int], Frames],
         truth: Trajectory | None = None,
         imu: Imu | None = None,
+        numbers: Int[np.ndarray, "frame"] | None = None,
     ):
+        self.numbers = np.arange(len(times)) if numbers is None else numbers
         self.config, self.times, self.valid, self.truth, self.imu = config, times, valid, truth, imu
         self._read = read
 
@@ -78,15 +82,18 @@ class Evidence:
         def read(first: int, last: int) -> Frames:
             return adc(start + first * step, min(start + (last - 1) * step + 1, frames.span.stop))[::step]
 
-        imu = Imu.of(frames.recording) if frames.recording.has("imu/time") else None
-        return cls(frames.config, frames.times, frames.valid, read, frames.truth, imu)
+        try:
+            imu = Imu.of(frames.recording) if frames.recording.has("imu/time") else None
+        except InputError:  # one that is of no use is as good as none
+            imu = None
+        return cls(frames.config, frames.times, frames.valid, read, frames.truth, imu, np.asarray(frames.numbers))
 
     def mended(self, mending: Mending) -> "Evidence":
         """What it would be of the mended recording."""
         config, read, change = mending.config or self.config, self._read, mending.samples
-        times, valid = self.times, self.valid
+        times, valid, numbers = self.times, self.valid, self.numbers
         if (order := mending.order) is not None:
-            valid = valid[order]
+            valid, numbers = valid[order], numbers[order]
             times = times[: len(order)] if mending.keeps_stamps else times[order]
         if mending.period is not None:
             times = times[0] + mending.period * np.arange(len(times))
@@ -98,7 +105,7 @@ class Evidence:
                 samples = np.concatenate([read(k, k + 1) for k in order[first:last]])
             return samples if change is None else change(samples)
 
-        return Evidence(config, times, valid, mend, self.truth, self.imu)
+        return Evidence(config, times, valid, mend, self.truth, self.imu, numbers)
 
     def read(self, start: int, stop: int) -> Frames:
         """Frames start...stop-1."""
@@ -166,7 +173,7 @@ class Evidence:
         digests, silent, looks = [], [], []
         for start in range(0, len(self), _BATCH):
             frames = self._read(start, min(start + _BATCH, len(self)))
-            digests += [crc32(memoryview(np.ascontiguousarray(frame)).cast("B")) for frame in frames]
+            digests += [crc32(frame.tobytes()) for frame in frames]
             silent += [not frame.any() for frame in frames]
             looks.append(self._look(frames))
         all_looks = np.concatenate(looks) if looks else np.zeros((0, 1), np.float32)

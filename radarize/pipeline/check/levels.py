@@ -29,6 +29,10 @@ def sureness(value: float, threshold: float) -> float:
     return float(1 - 0.5 ** max(value / threshold, 1.0))
 
 
+def _decibels(power: float, usual: float) -> float:
+    return float(10 * np.log10(max(power, 1e-9) / usual))
+
+
 def silence(evidence: Evidence) -> Iterator[Finding]:
     """All samples are equal, or there are none."""
     if not evidence.samples.size or not np.ptp(evidence.samples):
@@ -71,16 +75,17 @@ def receivers(evidence: Evidence) -> Iterator[Finding]:
     usual = max(float(np.median(power)), 1e-30)
     for k in np.flatnonzero(power < _DEAD * usual):
         yield Finding(
-            "receiver dead", f"RX{rx[k] + 1} has {10 * np.log10(max(power[k], 1e-9) / usual):.0f} dB of the others' power",
+            "receiver dead", f"RX{rx[k] + 1} has {_decibels(power[k], usual):.0f} dB of the others' power",
             sureness(_DEAD * usual / max(power[k], 1e-9), 1.0), f"repair RX{rx[k] + 1}, or leave it out (channelCfg)",
         )  # fmt: skip
     dead = power < _DEAD * usual
     for k in range(len(rx)):
         each = np.abs(frames[:, :, :, k].astype(np.int32))
-        share = float((each == each.max()).mean())
-        if not dead[k] and each.max() > 64 and share > _CLIPPED:
+        peak = int(each.max())
+        share = float((each == peak).mean())
+        if not dead[k] and peak > 64 and share > _CLIPPED:
             yield Finding(
-                "receiver saturated", f"{share:.2%} of the samples of RX{rx[k] + 1} are at {each.max()} counts",
+                "receiver saturated", f"{share:.2%} of the samples of RX{rx[k] + 1} are at {peak} counts",
                 sureness(share, _CLIPPED), "lower the receivers' gain (profileCfg), or move what reflects nearby",
             )  # fmt: skip
     yield from _copies(frames, dead, evidence)
@@ -122,8 +127,8 @@ def transmitters(evidence: Evidence) -> Iterator[Finding]:
     usual = float(power.max())
     for k in np.flatnonzero(power < _DEAD * usual):
         yield Finding(
-            "transmitter dead", f"echoes of TX{tx[k] + 1} have {10 * np.log10(max(power[k], 1e-9) / usual):.0f} dB of the "
-            "strongest transmitter's power", sureness(_DEAD * usual / max(power[k], 1e-9), 1.0),
+            "transmitter dead", f"echoes of TX{tx[k] + 1} have {_decibels(power[k], usual):.0f} dB of the most",
+            sureness(_DEAD * usual / max(power[k], 1e-9), 1.0),
             f"look at txEnable in chirpCfg and at the board, or leave TX{tx[k] + 1} out (--tx)",
         )  # fmt: skip
 

@@ -9,7 +9,7 @@ from radarize.pipeline.check.planewaves import PlaneWaves
 from radarize.pipeline.check.tracks import Tracks
 from radarize.signal.snapshots import Snapshots
 
-#: Purity of cells that are used; m/s by which an echo may miss a velocity; echoes that must agree, and pairs for a turn.
+#: Purity of cells that are used; m/s by which an echo may miss a velocity; echoes that must agree; pairs for a turn.
 _PURE, _OFF, _AGREE, _PAIRS = 0.8, 0.12, 8, 6
 #: Pairs of echoes that are tried.
 _TRIED = 150

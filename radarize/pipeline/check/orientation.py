@@ -42,7 +42,8 @@ def upside_down(evidence: Evidence) -> Iterator[Finding]:
     up = float(np.median(evidence.imu.samples[:, 2]))
     if up < -_UPRIGHT:
         yield Finding(
-            "upside down", f"the accelerometer reads {up:.1f} m/s^2 along the radar's upward axis", sureness(-up, _UPRIGHT),
+            "upside down", f"the accelerometer reads {up:.1f} m/s^2 along the radar's upward axis",
+            sureness(-up, _UPRIGHT),
             "turn the radar, or take a board file whose antennas have left and up negated (--board)",
             Mending(_turned(evidence.config, -1, -1)),
         )  # fmt: skip

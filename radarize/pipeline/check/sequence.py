@@ -46,7 +46,8 @@ def repeated(evidence: Evidence) -> Iterator[Finding]:
     if copied:
         start = evidence.times[np.flatnonzero(again & ~before)[0]] - evidence.times[0]
         yield Finding(
-            "frames repeated", f"{copied} of {len(digest)} frames hold samples of earlier ones, from {start:.1f} s on", 1.0,
+            "frames repeated", f"{copied} of {len(digest)} frames hold samples of earlier ones, from {start:.1f} s on",
+            1.0,
             "look at what made the file: a part was written twice; leave these frames out",
             None if frozen else Mending(order=order), hides=not frozen,
         )  # fmt: skip

@@ -79,7 +79,8 @@ def chirps(evidence: Evidence) -> Iterator[Finding]:
     off = abs(abs(factor.value) - 1)
     if off > max(_RATE, _SIGMAS * factor.error):
         yield Finding(
-            "chirp parameters", f"ranges change {abs(factor.value):.2f} +- {factor.error:.2f} times as fast as Doppler says",
+            "chirp parameters",
+            f"ranges change {abs(factor.value):.2f} +- {factor.error:.2f} times as fast as Doppler says",
             sureness(off / max(_RATE, _SIGMAS * factor.error), 1.0),
             "look at slope and sample rate (range) and at idle and ramp-end time (speed) of the profile",
         )  # fmt: skip

@@ -224,9 +224,9 @@ def receiver_copied(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def receiver_saturated(walk: Walk, rng: np.random.Generator) -> Walk:
-    """One that is driven ten times too hard."""
+    """One whose converter ends at twice the standard deviation of what comes in."""
     adc = walk.adc.astype(np.int32)
-    most = int(np.abs(adc[:, :, :, 1]).max()) // 10
+    most = int(2 * adc[:, :, :, 1].std())
     adc[:, :, :, 1] = np.clip(adc[:, :, :, 1], -most, most)
     return replace(walk, adc=adc.astype(np.int16))
 
@@ -279,6 +279,11 @@ def delayed(metres: float) -> Harm:
         return replace(walk, adc=_counts(_signal(walk) * turn))
 
     return harm
+
+
+def biased(metres: float) -> Harm:
+    """A range bias is configured that is none."""
+    return lambda walk, rng: replace(walk, config=walk.config.changed("benchmark", range_bias=metres))
 
 
 # --- time -------------------------------------------------------------------------------------------------------------
@@ -390,7 +395,7 @@ FAULTS: dict[str, Fault] = {
     "noise": Fault("pure noise", noise),
     "radar at rest": Fault("no motion", still),
     "range + 0.25 m": Fault("range bias", delayed(0.25)),
-    "range - 0.2 m": Fault("range bias", delayed(-0.2)),
+    "range bias of 0.25 m configured": Fault("range bias", biased(0.25)),
     "interference in 1 %": Fault("interference", hurt(hardships.interference(0.01))),
     "interference in 5 %": Fault("interference", hurt(hardships.interference(0.05))),
     "stamps 1 ns apart": Fault("stamps too dense", stamps(lambda config: 1e-9)),

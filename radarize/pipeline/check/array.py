@@ -16,6 +16,7 @@ from radarize.io.errors import InputError
 from radarize.pipeline.check.evidence import Evidence
 from radarize.pipeline.check.finding import Finding, Mending, NotObservable
 from radarize.pipeline.check.levels import sureness
+from radarize.pipeline.check.orientation import mirrored
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.radar.boards import BOARDS, load_board
 from radarize.radar.config import RadarConfig
@@ -28,6 +29,8 @@ _SHARE, _MORE = 0.08, 1.25
 _PURE, _SHARP = 0.9, 8
 #: Standard deviation of direction cosines upward below which nothing is seen above or below: 0.1 to 0.3 in rooms.
 _LEVEL = 0.03
+#: Standard deviations by which arrays that explain the same, being mirror images, may differ.
+_ALIKE = 1.5
 #: Cells that all other arrays are tried on, at most.
 _TRIED = 800
 #: Hz: bands in which boards are taken for one another.
@@ -124,21 +127,36 @@ def antennas(evidence: Evidence) -> Iterator[Finding]:
     cells = evidence.cells
     cells = cells.where(np.arange(0, len(cells.speed), max(1, -(-len(cells.speed) // _TRIED))))
     here = fit_plane_waves(cells, evidence.reading)
-    best, margin, pure = None, -np.inf, 0.0
+    tried = []
     for candidate in candidates(evidence.config):
         waves = fit_plane_waves(cells, candidate.reading)
         better = waves.purity**_SHARP - here.purity**_SHARP
         sigmas = float(better.mean() / (better.std() + 1e-9) * np.sqrt(len(better)))
-        if sigmas > margin:
-            best, margin, pure = candidate, sigmas, float((waves.purity > _PURE).mean())
+        tried.append((sigmas, float((waves.purity > _PURE).mean()), candidate))
     now = float((here.purity > _PURE).mean())
-    if best is None or max(now, pure) < _SHARE:
+    margin, pure, best = max(tried, key=lambda each: each[0], default=(0.0, 0.0, None))
+    if max(now, pure) < _SHARE:
         raise NotObservable(f"{max(now, pure):.0%} of the echoes are plane waves by any array, {_SHARE:.0%} are needed")
-    if margin > _SIGMAS and pure > _MORE * now:
+    if best is not None and margin > _SIGMAS and pure > _MORE * now:
+        best = _upright([each for sigmas, _, each in tried if sigmas > margin - _ALIKE], best, evidence)
         yield Finding(
             best.kind, f"{pure:.0%} of the echoes are plane waves with {best.words}, {now:.0%} as configured",
             sureness(margin, _SIGMAS), best.remedy, best.mending, hides=True,
         )  # fmt: skip
+
+
+def _upright(rivals: list[Candidate], best: Candidate, evidence: Evidence) -> Candidate:
+    """Of arrays that explain echoes equally well, mirror images of each other, one that an IMU or poses agree with.
+
+    On the IWR1843, receivers in reverse order are the mirror image of exchanged outer transmitters.
+    """
+    for rival in sorted(rivals, key=lambda each: each is not best):
+        try:
+            if not list(mirrored(evidence.mended(rival.mending))):
+                return rival
+        except NotObservable:
+            break
+    return best
 
 
 def elevation(evidence: Evidence) -> Iterator[Finding]:

@@ -106,11 +106,11 @@ def check_evidence(evidence: Evidence) -> Check:
     """
     findings: list[Finding] = []
     unseen: dict[str, str] = {}
-    blocked, still = "", False
+    blocked = ""
     for test in TESTS:
-        why = blocked or ("the radar hardly moves" if still and test.moving else "")
-        if why:
-            unseen.update(dict.fromkeys(test.kinds, why))
+        hidden = blocked or ", ".join(each.kind for each in findings if each.kind in test.unless)
+        if hidden:
+            unseen.update(dict.fromkeys(test.kinds, f"hidden by: {hidden}"))
             continue
         try:
             found = list(test.find(evidence))
@@ -119,9 +119,8 @@ def check_evidence(evidence: Evidence) -> Check:
             continue
         findings += found
         for each in found:
-            still |= each.kind == "no motion"
             if each.mending is not None:
                 evidence = evidence.mended(each.mending)
             elif each.hides:
-                blocked = f"hidden by: {each.kind}"
+                blocked = each.kind
     return Check(tuple(findings), unseen)

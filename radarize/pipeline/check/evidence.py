@@ -13,7 +13,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Clip
 from radarize.io.trajectory import Trajectory
 from radarize.odometry.inertial import Imu
-from radarize.pipeline.check.finding import Mending
+from radarize.pipeline.check.finding import Mending, NotObservable
 from radarize.pipeline.check.motion import Motions, find_motions
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.pipeline.check.tracks import Tracks, find_tracks
@@ -163,7 +163,13 @@ class Evidence:
 
     @cached_property
     def motions(self) -> Motions:
-        """How the radar moves at the chosen places."""
+        """How the radar moves at the chosen places.
+
+        Raises:
+            NotObservable: channels are too few for directions.
+        """
+        if np.prod(self.config.frame_shape[1:3]) < 4:
+            raise NotObservable("there are too few channels for directions")
         return find_motions(self.cells, self.waves, self.tracks, self.times)
 
     # --- all frames --------------------------------------------------------------------------------------------------
@@ -186,5 +192,6 @@ class Evidence:
         profile = scipy.fft.fft(some * np.hanning(self.config.samples).astype(np.float32), axis=-1)
         beams = scipy.fft.fft(profile, axis=3)
         first = int(np.searchsorted(self.config.ranges, NEAREST))
-        power = np.square(np.abs(beams)).mean(axis=(1, 2))[..., first:-2]  # (frame, beam, range)
+        # The median over chirps, for interference and lost ones have no say.
+        power = np.median(np.square(np.abs(beams[..., first:-2])), axis=(1, 2))  # (frame, beam, range)
         return np.log(power.reshape(len(frames), -1) + np.float32(1e-3))

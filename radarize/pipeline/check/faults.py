@@ -13,15 +13,23 @@ from radarize.pipeline.check.finding import Finding
 
 
 class Test(NamedTuple):
-    """A test, and the kinds of faults that it finds."""
+    """A test.
+
+    Attributes:
+        find: the test.
+        kinds: of faults that it finds.
+        unless: kinds that, once found, leave nothing for it to see.
+    """
 
     find: Callable[[Evidence], Iterator[Finding]]
     kinds: tuple[str, ...]
-    moving: bool = False
+    unless: tuple[str, ...] = ()
 
 
+STILL = ("no motion",)
 TESTS = (
     Test(levels.silence, ("no signal",)),
+    Test(levels.one_of_two, ("I without Q",)),
     Test(levels.offset_binary, ("offset-binary samples",)),
     Test(encoding.order_of_words, ("byte order", "layout", "layout of I and Q", "loops and chirps")),
     Test(levels.noise, ("pure noise",)),
@@ -39,16 +47,16 @@ TESTS = (
     Test(disturbance.interference, ("interference",)),
     Test(disturbance.leakage, ("range bias",)),
     Test(orientation.standing, ("no motion",)),
-    Test(array.antennas, ("transmitter order", "receiver order", "board"), moving=True),
-    Test(array.elevation, ("elevation missing",), moving=True),
-    Test(sequence.shuffled, ("frames shuffled",), moving=True),
-    Test(sequence.reversed_, ("frames reversed",), moving=True),
-    Test(sequence.cuts, ("cut and rejoined",), moving=True),
+    Test(array.antennas, ("transmitter order", "receiver order", "board"), unless=STILL),
+    Test(array.elevation, ("elevation missing",), unless=STILL),
+    Test(sequence.shuffled, ("frames shuffled",), unless=STILL),
+    Test(sequence.reversed_, ("frames reversed",), unless=STILL),
+    Test(sequence.cuts, ("cut and rejoined",), unless=(*STILL, "frames shuffled")),
     Test(stamps.period, ("frame period",)),
-    Test(stamps.chirps, ("chirp parameters",), moving=True),
+    Test(stamps.chirps, ("chirp parameters",), unless=STILL),
     Test(orientation.upside_down, ("upside down",)),
-    Test(orientation.mirrored, ("azimuth mirrored",), moving=True),
-    Test(orientation.backwards, ("facing backwards",), moving=True),
+    Test(orientation.mirrored, ("azimuth mirrored",), unless=(*STILL, "upside down")),
+    Test(orientation.backwards, ("facing backwards",), unless=STILL),
 )
 #: Kinds of faults, and what no radar recording shows on its own.
-FAULTS = tuple(kind for test in TESTS for kind in test.kinds)
+FAULTS = tuple(dict.fromkeys(kind for test in TESTS for kind in test.kinds))

@@ -12,8 +12,9 @@ from radarize.radar.noise import noise_floor, noise_profile
 RARE = 4
 #: A channel is dead whose power is less than this share of the median channel's.
 _DEAD = 1 / 30
-#: Share of a receiver's samples at its own largest magnitude: one that is not clipped has a few of them.
-_CLIPPED = 1e-3
+#: Share of a receiver's samples at its own largest magnitude: one that is not clipped has a few of them, unless all are
+#: within some counts.
+_CLIPPED, _SMALL = 1e-3, 16
 #: Two channels hold the same samples if this share of them is equal; by chance it is 1/50 at most.
 _SAME = 0.9
 #: Power of the image over that of the signal: data sheet of the IWR1843, -30 dB.
@@ -79,13 +80,13 @@ def receivers(evidence: Evidence) -> Iterator[Finding]:
             sureness(_DEAD * usual / max(power[k], 1e-9), 1.0), f"repair RX{rx[k] + 1}, or leave it out (channelCfg)",
         )  # fmt: skip
     dead = power < _DEAD * usual
-    for k in range(len(rx)):
-        each = np.abs(frames[:, :, :, k].astype(np.int32))
+    for place in np.flatnonzero(~dead):
+        each = np.abs(frames[:, :, :, place].astype(np.int32))
         peak = int(each.max())
         share = float((each == peak).mean())
-        if not dead[k] and peak > 64 and share > _CLIPPED:
+        if peak > _SMALL and share > _CLIPPED:
             yield Finding(
-                "receiver saturated", f"{share:.2%} of the samples of RX{rx[k] + 1} are at {peak} counts",
+                "receiver saturated", f"{share:.2%} of the samples of RX{rx[place] + 1} are at {peak} counts",
                 sureness(share, _CLIPPED), "lower the receivers' gain (profileCfg), or move what reflects nearby",
             )  # fmt: skip
     yield from _copies(frames, dead, evidence)
@@ -103,7 +104,7 @@ def _copies(frames: np.ndarray, dead: np.ndarray, evidence: Evidence) -> Iterato
     if len(rx) > 1 and len(pairs) == len(rx) * (len(rx) - 1) // 2:
         yield Finding(
             "channels alike", f"all {len(rx)} receivers hold the same samples", 1.0,
-            "look at what made the file: one receiver was written for all",
+            "look at what made the file: one receiver was written for all", hides=True,
         )  # fmt: skip
         return
     for a, b in pairs:
@@ -130,6 +131,17 @@ def transmitters(evidence: Evidence) -> Iterator[Finding]:
             "transmitter dead", f"echoes of TX{tx[k] + 1} have {_decibels(power[k], usual):.0f} dB of the most",
             sureness(_DEAD * usual / max(power[k], 1e-9), 1.0),
             f"look at txEnable in chirpCfg and at the board, or leave TX{tx[k] + 1} out (--tx)",
+        )  # fmt: skip
+
+
+def one_of_two(evidence: Evidence) -> Iterator[Finding]:
+    """Q holds nothing, or what I holds."""
+    real, imaginary = np.moveaxis(evidence.samples[::RARE], -1, 0)
+    empty = [name for name, part in (("I", real), ("Q", imaginary)) if not np.ptp(part)]
+    if empty or float((real == imaginary).mean()) > _SAME:
+        yield Finding(
+            "I without Q", f"{empty[0]} is constant" if empty else "Q holds the samples of I", 1.0,
+            "sample complex (adcCfg 2 1), or import real samples with --layout real", hides=True,
         )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from jaxtyping import Complex64, Float
+from jaxtyping import Complex, Complex64, Float
 
 from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
@@ -20,14 +20,14 @@ class Reading:
 
     Attributes:
         places: (left, up) of the virtual antennas, half wavelengths.
-        sign: of the channels.
+        sign: of the channels, of norm 1.
         delay: s, from a loop's start to each transmitter's chirp.
         wavelength: m.
         spacing: half wavelengths at the design frequency in half wavelengths of the signal.
     """
 
     places: Float[np.ndarray, "tx rx 2"]
-    sign: Float[np.ndarray, "tx rx"]
+    sign: Complex[np.ndarray, "tx rx"]
     delay: Float[np.ndarray, "tx"]
     wavelength: float
     spacing: float = 1.0

@@ -152,7 +152,7 @@ def _sorted(looks: np.ndarray) -> Int[np.ndarray, "frame"]:
         left.discard(path[-1])
     order = np.array(path)
     for _ in range(20):
-        if not _exchanged(order, alike):
+        if not (_exchanged(order, alike) | _moved(order, alike)):
             break
     return order if np.corrcoef(order, np.arange(frames))[0, 1] >= 0 else order[::-1]
 
@@ -170,4 +170,18 @@ def _exchanged(order: np.ndarray, alike: np.ndarray) -> bool:
             if gain > 1e-6:
                 order[start:stop] = order[start:stop][::-1].copy()
                 changed = True
+    return changed
+
+
+def _moved(order: np.ndarray, alike: np.ndarray) -> bool:
+    """Move single frames to where they are most like both neighbours; False if none is elsewhere."""
+    changed, frames = False, len(order)
+    for k in range(frames):
+        frame, rest = order[k], np.delete(order, k)
+        here = alike[rest[:-1], frame] + alike[frame, rest[1:]] - alike[rest[:-1], rest[1:]]
+        gains = np.concatenate([[alike[frame, rest[0]]], here, [alike[rest[-1], frame]]])
+        best = int(gains.argmax())
+        if best != k and gains[best] > gains[k] + 1e-6:
+            order[:] = np.insert(rest, best, frame)
+            changed = True
     return changed

@@ -110,12 +110,12 @@ def _enough(evidence: Evidence, frames: int = _FRAMES) -> None:
         raise NotObservable(f"there are {len(evidence)} frames, {frames} are needed")
 
 
-def _likeness(evidence: Evidence) -> Float[np.ndarray, "frame 2*around"]:
+def _likeness(evidence: Evidence) -> Float[np.ndarray, "frame neighbour"]:
     _enough(evidence)
     return _similar(evidence.sequence.looks)
 
 
-def _similar(looks: np.ndarray) -> Float[np.ndarray, "frame 2*around"]:
+def _similar(looks: np.ndarray) -> Float[np.ndarray, "frame neighbour"]:
     """Correlation with the frames up to `_AROUND` before and after; -1 beyond the ends."""
     frames = len(looks)
     found = np.full((frames, 2 * _AROUND), -1.0)

@@ -171,6 +171,11 @@ def mirrored(walk: Walk, rng: np.random.Generator) -> Walk:
     return replace(walk, config=_negated(walk.config, -1, 1))
 
 
+def elevation_mirrored(walk: Walk, rng: np.random.Generator) -> Walk:
+    """A board's file with up and down exchanged."""
+    return replace(walk, config=_negated(walk.config, 1, -1))
+
+
 def mirrored_blind(walk: Walk, rng: np.random.Generator) -> Walk:
     """The same where nothing else knows."""
     return replace(mirrored(walk, rng), imu=None, truth=None)
@@ -347,8 +352,9 @@ def reversed_(walk: Walk, rng: np.random.Generator) -> Walk:
 
 def rejoined(walk: Walk, rng: np.random.Generator) -> Walk:
     """Two seconds are cut out, and stamps go on."""
-    start = int(rng.integers(60, len(walk.adc) - 120))
-    return walk.of(np.delete(np.arange(len(walk.adc)), slice(start, start + 60)), stamped=False)
+    two, frames = round(2 / walk.config.frame_period), np.arange(len(walk.adc))
+    start = int(rng.integers(len(frames) // 4, max(len(frames) - 2 * two, len(frames) // 4 + 1)))
+    return walk.of(np.delete(frames, slice(start, start + two)), stamped=False)
 
 
 def teleported(walk: Walk, rng: np.random.Generator) -> Walk:
@@ -378,6 +384,7 @@ FAULTS: dict[str, Fault] = {
     "another board": Fault("board", other_board),
     "azimuth mirrored; IMU and poses": Fault("azimuth mirrored", mirrored),
     "azimuth mirrored; radar alone": Fault("azimuth mirrored", mirrored_blind),
+    "elevation mirrored; poses": Fault("elevation mirrored", elevation_mirrored),
     "upside down, with its IMU": Fault("upside down", upside_down),
     "facing backwards; poses": Fault("facing backwards", backwards),
     "TX2 not raised": Fault("elevation missing", level),

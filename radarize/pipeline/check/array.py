@@ -31,8 +31,9 @@ _PURE, _SHARP = 0.9, 8
 _LEVEL = 0.03
 #: Standard deviations by which arrays that explain the same, being mirror images, may differ.
 _ALIKE = 1.5
-#: Cells that all other arrays are tried on, at most.
-_TRIED = 800
+#: Cells that other arrays are tried on, at most; every N-th of them is enough for those that explain these worse by so
+#: many standard deviations.
+_TRIED, _FEW, _HOPELESS = 800, 5, -2.0
 #: Hz: bands in which boards are taken for one another.
 _BAND = 70e9
 
@@ -127,12 +128,13 @@ def antennas(evidence: Evidence) -> Iterator[Finding]:
     cells = evidence.cells
     cells = cells.where(np.arange(0, len(cells.speed), max(1, -(-len(cells.speed) // _TRIED))))
     here = fit_plane_waves(cells, evidence.reading)
+    few = np.arange(0, len(cells.speed), _FEW)
     tried = []
     for candidate in candidates(evidence.config):
+        if _sigmas(fit_plane_waves(cells.where(few), candidate.reading), here.purity[few]) < _HOPELESS:
+            continue
         waves = fit_plane_waves(cells, candidate.reading)
-        better = waves.purity**_SHARP - here.purity**_SHARP
-        sigmas = float(better.mean() / (better.std() + 1e-9) * np.sqrt(len(better)))
-        tried.append((sigmas, float((waves.purity > _PURE).mean()), candidate))
+        tried.append((_sigmas(waves, here.purity), float((waves.purity > _PURE).mean()), candidate))
     now = float((here.purity > _PURE).mean())
     margin, pure, best = max(tried, key=lambda each: each[0], default=(0.0, 0.0, None))
     if max(now, pure) < _SHARE:
@@ -143,6 +145,12 @@ def antennas(evidence: Evidence) -> Iterator[Finding]:
             best.kind, f"{pure:.0%} of the echoes are plane waves with {best.words}, {now:.0%} as configured",
             sureness(margin, _SIGMAS), best.remedy, best.mending, hides=True,
         )  # fmt: skip
+
+
+def _sigmas(waves: PlaneWaves, purity: np.ndarray) -> float:
+    """Standard deviations by which they explain cells better than with some purity."""
+    better = waves.purity**_SHARP - purity**_SHARP
+    return float(better.mean() / (better.std() + 1e-9) * np.sqrt(len(better)))
 
 
 def _upright(rivals: list[Candidate], best: Candidate, evidence: Evidence) -> Candidate:

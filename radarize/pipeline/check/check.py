@@ -1,6 +1,7 @@
 """Check a recording: the faults that its samples show."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from weakref import WeakKeyDictionary
@@ -9,8 +10,9 @@ from radarize.io.errors import InputError
 from radarize.io.load import Source, frames_of
 from radarize.io.recording import Clip, Recording
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.faults import TESTS
+from radarize.pipeline.check.faults import TESTS, Test
 from radarize.pipeline.check.finding import Finding, NotObservable
+from radarize.pipeline.check.summary import Sequence
 
 
 @dataclass(frozen=True)
@@ -82,32 +84,54 @@ def check(recording: Source, fix: str | Path | None = None) -> Check:
 
 
 def warnings_before(frames: Clip) -> list[str]:
-    """A sentence on each fault of the recording that frames are of, for those who are about to use it.
+    """A sentence on each fault that some frames of a recording show, for those who are about to use it.
 
     Asked again of the same open recording, it is not checked again.
     """
+    return [*map(str, _looked_at(frames).findings)]
+
+
+def warnings_after(frames: Clip, sequence: Sequence) -> list[str]:
+    """The same of faults that only all frames together show.
+
+    Args:
+        frames: as before.
+        sequence: of all frames of their span, by who has read them anyway.
+    """
+    evidence = Evidence.of(frames.recording[frames.span.start : frames.span.stop])
+    evidence.sequence = sequence
+    before = _looked_at(frames).findings
+    found = check_evidence(evidence, [test for test in TESTS if test.whole], before)
+    return [*map(str, found.findings[len(before) :])]
+
+
+def _looked_at(frames: Clip) -> "Check":
     recording, span = frames.recording, frames.span
     if not recording.has_samples or not len(frames):
-        return []
+        return Check((), {})
     known = _CHECKED.setdefault(recording, {})
     if span not in known:
-        known[span] = check_evidence(Evidence.of(recording[span.start : span.stop])).warnings()
+        evidence = Evidence.of(recording[span.start : span.stop])
+        known[span] = check_evidence(evidence, [test for test in TESTS if not test.whole])
     return known[span]
 
 
 #: What was found in open recordings, by the span of frames.
-_CHECKED: WeakKeyDictionary[Recording, dict[range, list[str]]] = WeakKeyDictionary()
+_CHECKED: WeakKeyDictionary[Recording, dict[range, Check]] = WeakKeyDictionary()
 
 
-def check_evidence(evidence: Evidence) -> Check:
-    """All tests on evidence.
+def check_evidence(evidence: Evidence, tests: Iterable[Test] = TESTS, before: tuple[Finding, ...] = ()) -> Check:
+    """Tests on evidence.
 
     What hides others is mended for the tests that follow; if it cannot be, these are not made.
+
+    Args:
+        tests: in their order.
+        before: what others found; mended in the evidence or not.
     """
-    findings: list[Finding] = []
-    unseen: dict[str, str] = {}
-    blocked = ""
-    for test in TESTS:
+    findings, unseen = [*before], {}
+    blocked = next((each.kind for each in before if each.hides and each.mending is None), "")
+    for test in tests:
         hidden = blocked or ", ".join(each.kind for each in findings if each.kind in test.unless)
         if hidden:
             unseen.update(dict.fromkeys(test.kinds, f"hidden by: {hidden}"))

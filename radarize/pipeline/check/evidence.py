@@ -2,12 +2,10 @@
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
-from zlib import crc32
 
 import numpy as np
 import scipy.fft
-from jaxtyping import Bool, Complex64, Float, Float32, Int, Int16
+from jaxtyping import Bool, Complex64, Float, Int, Int16
 
 from radarize.io.errors import InputError
 from radarize.io.recording import Clip
@@ -16,9 +14,10 @@ from radarize.odometry.inertial import Imu
 from radarize.pipeline.check.finding import Mending, NotObservable
 from radarize.pipeline.check.motion import Motions, find_motions
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
+from radarize.pipeline.check.summary import Sequence, Summary
 from radarize.pipeline.check.tracks import Tracks, find_tracks
 from radarize.radar.config import RadarConfig
-from radarize.signal.snapshots import NEAREST, Snapshots, find_snapshots
+from radarize.signal.snapshots import Snapshots, find_snapshots
 
 #: Frames that are looked at closely: so many places, evenly over the recording, and consecutive frames at each.
 PLACES, RUN = 16, 4
@@ -26,21 +25,6 @@ PLACES, RUN = 16, 4
 _EVERY, _BATCH = 8, 16
 
 Frames = Int16[np.ndarray, "frame loop tx rx sample 2"]
-
-
-class Sequence(NamedTuple):
-    """All frames in short.
-
-    Attributes:
-        digest: CRC-32 of the samples.
-        silent: no sample differs from zero.
-        looks: logarithm of power over range beyond the leakage and over beams, less its mean over all frames, of
-            norm 1.
-    """
-
-    digest: Int[np.ndarray, "frame"]
-    silent: Bool[np.ndarray, "frame"]
-    looks: Float32[np.ndarray, "frame cell"]
 
 
 class Evidence:
@@ -175,23 +159,8 @@ class Evidence:
     # --- all frames --------------------------------------------------------------------------------------------------
     @cached_property
     def sequence(self) -> Sequence:
-        """All frames in short."""
-        digests, silent, looks = [], [], []
+        """All frames in short; who has read them already may have set it."""
+        summary = Summary(self.config)
         for start in range(0, len(self), _BATCH):
-            frames = self._read(start, min(start + _BATCH, len(self)))
-            digests += [crc32(frame.tobytes()) for frame in frames]
-            silent += [not frame.any() for frame in frames]
-            looks.append(self._look(frames))
-        all_looks = np.concatenate(looks) if looks else np.zeros((0, 1), np.float32)
-        all_looks = all_looks - all_looks.mean(axis=0)
-        all_looks /= np.maximum(np.linalg.norm(all_looks, axis=1, keepdims=True), 1e-12)
-        return Sequence(np.array(digests, int), np.array(silent, bool), all_looks)
-
-    def _look(self, frames: Frames) -> Float32[np.ndarray, "frame cell"]:
-        some = np.ascontiguousarray(frames[:, ::_EVERY], np.float32).view(np.complex64)[..., 0]
-        profile = scipy.fft.fft(some * np.hanning(self.config.samples).astype(np.float32), axis=-1)
-        beams = scipy.fft.fft(profile, axis=3)
-        first = int(np.searchsorted(self.config.ranges, NEAREST))
-        # The median over chirps, for interference and lost ones have no say.
-        power = np.median(np.square(np.abs(beams[..., first:-2])), axis=(1, 2))  # (frame, beam, range)
-        return np.log(power.reshape(len(frames), -1) + np.float32(1e-3))
+            summary.add(self._read(start, min(start + _BATCH, len(self))))
+        return summary.sequence

@@ -19,11 +19,13 @@ class Test(NamedTuple):
         find: the test.
         kinds: of faults that it finds.
         unless: kinds that, once found, leave nothing for it to see.
+        whole: it looks at all frames, not at some.
     """
 
     find: Callable[[Evidence], Iterator[Finding]]
     kinds: tuple[str, ...]
     unless: tuple[str, ...] = ()
+    whole: bool = False
 
 
 STILL = ("no motion",)
@@ -43,19 +45,20 @@ TESTS = (
     Test(levels.transmitters, ("transmitter dead",)),
     Test(stamps.bursts, ("stamps too dense",)),
     Test(stamps.missing, ("frames missing", "chirps lost")),
-    Test(sequence.repeated, ("frames frozen", "frames repeated")),
+    Test(sequence.repeated, ("frames frozen", "frames repeated"), whole=True),
     Test(disturbance.interference, ("interference",)),
     Test(disturbance.leakage, ("range bias",)),
     Test(orientation.standing, ("no motion",)),
     Test(array.antennas, ("transmitter order", "receiver order", "board"), unless=STILL),
     Test(array.elevation, ("elevation missing",), unless=STILL),
-    Test(sequence.shuffled, ("frames shuffled",), unless=STILL),
+    Test(sequence.shuffled, ("frames shuffled",), unless=STILL, whole=True),
     Test(sequence.reversed_, ("frames reversed",), unless=STILL),
-    Test(sequence.cuts, ("cut and rejoined",), unless=(*STILL, "frames shuffled")),
+    Test(sequence.cuts, ("cut and rejoined",), unless=(*STILL, "frames shuffled"), whole=True),
     Test(stamps.period, ("frame period",)),
     Test(stamps.chirps, ("chirp parameters",), unless=STILL),
     Test(orientation.upside_down, ("upside down",)),
     Test(orientation.mirrored, ("azimuth mirrored",), unless=(*STILL, "upside down")),
+    Test(orientation.elevation_mirrored, ("elevation mirrored",), unless=(*STILL, "upside down")),
     Test(orientation.backwards, ("facing backwards",), unless=STILL),
 )
 #: Kinds of faults, and what no radar recording shows on its own.

@@ -50,7 +50,7 @@ class Finding:
     hides: bool = False
 
     def __str__(self) -> str:
-        return f"{self.kind}: {self.measured}; {self.remedy}"
+        return f"{self.kind}: {self.measured} ({self.sure:.0%} sure); {self.remedy}"
 
     def row(self) -> dict[str, Any]:
         """As JSON has it."""

@@ -16,8 +16,10 @@ from radarize.radar.config import RadarConfig
 
 #: Share of echoes that move, below which the radar stands; bins of Doppler beyond which one moves.
 _MOVING, _BINS = 0.25, 0.75
-#: m/s and rad/s: what motion must be by both to be compared. Places that are needed, and agreement of their signs.
-_FAST, _TURNS, _PLACES, _SURE = 0.15, 0.12, 3, 0.8
+#: m/s, m/s and rad/s: what motion forward or sideways, upward, and turns must be by both to be compared.
+_FAST, _BOBS, _TURNS = 0.15, 0.05, 0.12
+#: Places that are needed, and share of them whose signs agree.
+_PLACES, _SURE = 3, 0.8
 #: m/s^2 of gravity along the radar's upward axis.
 _UPRIGHT = 5.0
 
@@ -66,6 +68,21 @@ def mirrored(evidence: Evidence) -> Iterator[Finding]:
             "azimuth mirrored", f"{opposite:.0%} of {len(pairs)} turns and sideways motions are to the other side than "
             f"{'an IMU' if evidence.truth is None else 'true poses'} have them", opposite,
             "take a board file whose antennas have left negated (--board)", Mending(_turned(evidence.config, -1, 1)),
+        )  # fmt: skip
+
+
+def elevation_mirrored(evidence: Evidence) -> Iterator[Finding]:
+    """The radar bobs down where true poses go up."""
+    if evidence.truth is None:
+        raise NotObservable("no true poses know up from down; floors and ceilings look alike")
+    velocity, _ = true_motion(evidence, evidence.motions.time)
+    pairs = _pairs(evidence.motions.velocity[:, 2], velocity[:, 2], _BOBS)
+    opposite = _opposite(pairs, "the radar hardly moves up and down")
+    if opposite > _SURE:
+        yield Finding(
+            "elevation mirrored", f"{opposite:.0%} of {len(pairs)} motions are downward where true poses go upward",
+            opposite, "take a board file whose antennas have up negated (--board)",
+            Mending(_turned(evidence.config, 1, -1)),
         )  # fmt: skip
 
 

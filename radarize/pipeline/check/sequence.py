@@ -55,10 +55,11 @@ def repeated(evidence: Evidence) -> Iterator[Finding]:
 
 def shuffled(evidence: Evidence) -> Iterator[Finding]:
     """Frames are most like others than their neighbours."""
-    likeness = _likeness(evidence)
-    share = _out_of_order(likeness)
+    seen = _seen(evidence)
+    looks = evidence.sequence.looks[seen]
+    share = _out_of_order(_similar(looks))
     if share > _SHUFFLED:
-        order = _sorted(evidence.sequence.looks)
+        order = seen[_sorted(looks)]
         better = _out_of_order(_similar(evidence.sequence.looks[order]))
         mending = Mending(order=_forward(evidence, order), keeps_stamps=True) if better < share / 4 else None
         yield Finding(
@@ -90,14 +91,16 @@ def reversed_(evidence: Evidence) -> Iterator[Finding]:
 
 def cuts(evidence: Evidence) -> Iterator[Finding]:
     """The radar is elsewhere from one frame to the next."""
-    likeness = _likeness(evidence)[:-1, _AROUND]  # with the next frame
-    steps = np.diff(evidence.times)
+    seen = _seen(evidence)
+    likeness = _similar(evidence.sequence.looks[seen])[:-1, _AROUND]  # with the next frame
+    times = evidence.times[seen]
+    steps = np.diff(times)
     whole = steps < 1.5 * np.median(steps)
     around = np.minimum(np.concatenate([likeness[2:], likeness[-4:-2]]), np.concatenate([likeness[1:3], likeness[:-2]]))
     jumps = np.flatnonzero((likeness < _JUMP) & (likeness < around - _LESS) & whole)
     if len(jumps):
         deepest = float((around - likeness)[jumps].max())
-        when = ", ".join(f"{evidence.times[k + 1] - evidence.times[0]:.2f}" for k in jumps[:5])
+        when = ", ".join(f"{times[k + 1] - evidence.times[0]:.2f}" for k in jumps[:5])
         yield Finding(
             "cut and rejoined", f"{len(jumps)} times the surroundings change from one frame to the next, at {when} s",
             sureness(deepest, _LESS), "run the parts on their own: rec[start:stop], or look for the frames between",
@@ -110,9 +113,13 @@ def _enough(evidence: Evidence, frames: int = _FRAMES) -> None:
         raise NotObservable(f"there are {len(evidence)} frames, {frames} are needed")
 
 
-def _likeness(evidence: Evidence) -> Float[np.ndarray, "frame neighbour"]:
+def _seen(evidence: Evidence) -> Int[np.ndarray, "seen"]:
+    """Numbers of frames of which half of the chirps arrived at least."""
     _enough(evidence)
-    return _similar(evidence.sequence.looks)
+    seen = np.flatnonzero(~evidence.sequence.silent & (evidence.valid.mean(axis=(1, 2)) > 0.5))
+    if len(seen) < _FRAMES:
+        raise NotObservable(f"{len(seen)} frames are whole, {_FRAMES} are needed")
+    return seen
 
 
 def _similar(looks: np.ndarray) -> Float[np.ndarray, "frame neighbour"]:

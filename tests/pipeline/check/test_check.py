@@ -31,6 +31,8 @@ from radarize.odometry.inertial import Imu
 from radarize.pipeline.check.check import check, check_evidence, warnings_before
 from radarize.pipeline.check.evidence import Evidence
 from radarize.pipeline.check.faults import TESTS
+from radarize.pipeline.check.finding import Finding, Mending
+from radarize.pipeline.check.mending import write_mended
 from radarize.radar.boards import load_board
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
@@ -86,10 +88,9 @@ def test_a_finding_says_what_was_measured_and_what_mends_it(whole):
 
 def test_a_standing_radar_is_not_judged_by_its_motion(whole):
     still = whole.of(np.zeros(40, int), stamped=False)
-    (first, second) = check_evidence(harmed(still, FAULTS["radar at rest"].harm).evidence).findings[:1] * 2
-    assert first.kind == second.kind == "no motion"
-    unseen = check_evidence(harmed(still, FAULTS["radar at rest"].harm).evidence).not_observable
-    assert {"transmitter order", "chirp parameters", "frames reversed"} <= {*unseen}
+    found = check_evidence(harmed(still, FAULTS["radar at rest"].harm).evidence)
+    assert [each.kind for each in found.findings] == ["no motion"]
+    assert {"transmitter order", "chirp parameters", "frames reversed"} <= {*found.not_observable}
 
 
 @pytest.mark.parametrize(
@@ -120,16 +121,18 @@ def test_repeated_frames_are_left_out(whole, tmp_path):
         np.testing.assert_array_equal(right.adc(0, len(right)), whole.adc[kept])
 
 
-def test_streams_come_along(path, tmp_path):
-    """Of a recording with an IMU and poses, rows of frames in the frames' order, others as they were."""
-    with Recording(path) as r:
-        frames = np.arange(len(r))[::-1]
-        with RecordingWriter(tmp_path / "wrong.h5", r.config) as writer:
-            writer.append(r.adc(0, len(r))[..., ::-1], r.times)
-        rz.check(tmp_path / "wrong.h5", tmp_path / "right.h5")
+def test_streams_come_along(path, whole, tmp_path):
+    """An IMU as it was, and poses; rows of frames with their frames."""
+    with Recording(path) as source:
+        mending = Mending(order=np.arange(len(source))[::-1])
+        write_mended(source[:], (Finding("x", "y", 1.0, "z", mending),), tmp_path / "right.h5")
         with Recording(tmp_path / "right.h5") as right:
-            np.testing.assert_array_equal(right.adc(3, 4), r.adc(3, 4))
-    assert len(frames)
+            np.testing.assert_array_equal(right.read("imu/gyroscope"), source.read("imu/gyroscope"))
+            assert {*right.names()} == {*source.names()} - {n for n in source.names() if n.startswith("points/")}
+            rows = [n for n in right.names() if right.file[n].attrs.get("clock") == "radar/time"]
+            assert rows
+            for name in rows:
+                np.testing.assert_array_equal(right.read(name), source.read(name)[::-1])
 
 
 def test_the_right_board_is_written(whole, tmp_path):
@@ -152,28 +155,47 @@ def test_nothing_to_mend_is_said(path, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def called(*words):
+    with pytest.raises(SystemExit) as stopped:
+        run_app(app, "radarize", [str(word) for word in words])
+    return stopped.value.code
+
+
 def test_the_command(path, whole, tmp_path, capsys):
-    assert run_app(app, ["check", str(path)]) == 0
+    assert called("check", path) == 0
     assert "no fault found" in capsys.readouterr().out
     wrong = write(harmed(whole, transmitters(0, 2, 1)), tmp_path / "wrong.h5")
-    assert run_app(app, ["check", str(wrong), "--json", "--fix", str(tmp_path / "right.h5")]) == 1
+    assert called("check", wrong, "--json", "--fix", tmp_path / "right.h5") == 1
     told = json.loads(capsys.readouterr().out)
     assert [each["kind"] for each in told["findings"]] == ["transmitter order"] and not told["well"]
     assert "azimuth mirrored" in told["not_observable"]
-    assert run_app(app, ["check", str(tmp_path / "right.h5")]) == 0
-    assert run_app(app, ["check", str(tmp_path / "missing.h5")]) == 2
+    assert called("check", tmp_path / "right.h5") == 0
+    assert called("check", tmp_path / "missing.h5") == 2
 
 
 def test_run_warns_and_does_not_change(whole, tmp_path, capsys):
     part = whole.of(np.arange(60, 120))
     wrong = write(harmed(part, exchanged_iq), tmp_path / "wrong.h5")
-    command = ["run", str(wrong), "-o", str(tmp_path / "run"), "--odometry", "doppler", "--scans", "first-echo"]
-    assert run_app(app, command) == 0
+    assert called("run", wrong, "-o", tmp_path / "run", "--odometry", "doppler", "--scans", "first-echo") == 0
     told = capsys.readouterr().err
     assert told.count("I and Q: leakage at negative range") == 1
     assert any("I and Q" in words for words in rz.Run(tmp_path / "run").warnings)
     with Recording(wrong) as recording:
-        assert warnings_before(recording[::2]) is warnings_before(recording[::2])
+        assert warnings_before(recording[::2]) == warnings_before(recording[:])
+
+
+def test_run_warns_of_what_all_frames_show(whole, tmp_path):
+    part = whole.of(np.array([*range(60, 90), *[90] * 20]), stamped=False)
+    run = rz.run(write(part, tmp_path / "wrong.h5"), tmp_path / "run", odometry="doppler", scans="first-echo")
+    assert any(words.startswith("frames frozen: 19 of 50") for words in run.warnings)
+    np.testing.assert_allclose(np.diff(run.odometry.time), part.config.frame_period)
+
+
+def test_live_warns_after_the_first_seconds(whole, tmp_path):
+    wrong = write(harmed(whole, exchanged_iq), tmp_path / "wrong.h5")
+    session = rz.live(replay=wrong, odometry="doppler", scans="first-echo")
+    assert len(list(session)) > 100
+    assert sum("I and Q" in words for words in session.warnings) == 1
 
 
 def test_frames_of_any_number_are_checked(whole):

@@ -1,6 +1,7 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
 # make bounds: tests of compiled loops, which then look whether they index within bounds
 # make docs: builds the pages of documentation, with an environment of its own (requirements-docs.lock)
+# make results: all pages of results, in days; RESULTS=--smoke a short trial of each part, RESULTS=walks one page
 # make lint: style, and types of what other programs import
 # make lowest: tests, in an environment of their own, with the lowest versions that pyproject.toml allows
 # make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
@@ -11,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # with a failure: with another in its place, xdist waits for ever.
 PYTEST := .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
-.PHONY: setup demo test bounds documents docs lowest lint clean
+.PHONY: setup demo test bounds documents docs results lowest lint clean
 
 setup:
 	@./setup.sh
@@ -41,6 +42,10 @@ docs: setup
 	@.venv/bin/python docs/pages.py
 	@NO_MKDOCS_2_WARNING=1 build/docs/bin/mkdocs build --strict --quiet
 	@echo build/site/index.html
+
+results: setup
+	@.venv/bin/python -m benchmarks.make $(RESULTS)
+	@.venv/bin/python -m benchmarks.figures
 
 lowest:
 	@$(or $(PYTHON),python3) -m venv --clear build/lowest && build/lowest/bin/python -m pip install -qq uv

@@ -6,10 +6,10 @@ frame index and by time.
 """
 
 import argparse
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
@@ -22,12 +22,11 @@ from radarize.evaluation.benchmark.choices import TRAINING
 
 #: Walks that are drawn: two of the building of the training, two of another.
 SHOWN = (118, 132, 227, 237)
-PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "clocks.png"
 #: Frames, standard deviation, of what is drawn.
 _SMOOTH = 3
 
 
-def draw(shown: list[tuple[Walk, Clock, Alike]]) -> None:
+def draw(shown: list[tuple[Walk, Clock, Alike]]) -> Figure:
     """How alike pictures are, over the walk and over how much later the lidar's is."""
     figure, axes = plt.subplots(1, len(shown), figsize=(11, 3), sharey=True)
     for axis, (walk, clock, known) in zip(axes, shown, strict=True):
@@ -41,7 +40,7 @@ def draw(shown: list[tuple[Walk, Clock, Alike]]) -> None:
         axis.set(title=f"walk {walk.number}", xlabel="s", ylim=(-most, most))
     axes[0].set_ylabel("lidar's picture later by, s")
     figure.tight_layout()
-    figure.savefig(PICTURE, dpi=90)
+    return figure
 
 
 @script("Clocks of real walks", data=CLONE, poses=POSES)
@@ -58,9 +57,9 @@ def main(options: argparse.Namespace) -> Page:
         errors = clocked_turn_errors(turns, poses_of(walk, options.poses), clock)
         yaw = {name: errors[name] for name in ("yaw_rmse_deg", "instant_yaw_rmse_deg")}
         rows.append({"walk": walk.number, "part": walk.folder.name, **clock.row(walk.frames), **yaw})
-    draw(shown)
     return Page(
         rows,
+        figure=draw(shown),
         data=radarhd("RadarHD's walks", walks),
         notes=[
             "By how many seconds the lidar's picture is later than the radar's of the same number, at a walk's start "

@@ -111,10 +111,12 @@ def row(name: str, found: Sequence[Outcome], plain: Sequence[Outcome]) -> dict[s
     "Hard conditions",
     folder=(Path("conditions"), "of the recordings, which are made if they are not there"),
     only=("", "conditions, comma-separated; all if none"),
+    seconds=(30.0, "of each walk"),
     workers=(2, "processes"),
 )
 def main(options: argparse.Namespace) -> Page:
-    walks, wanted = yaml.safe_load(WALKS.read_text()), options.only.split(",") if options.only else CONDITIONS
+    walks = [walk | {"duration": options.seconds} for walk in yaml.safe_load(WALKS.read_text())]
+    wanted = options.only.split(",") if options.only else CONDITIONS
     names = [name for name in CONDITIONS if name == "plain" or name in wanted]
     trials = [Trial(walk, name, options.folder) for name in names for walk in walks]
     recordings = {str(trial.recording): trial.record for trial in trials}

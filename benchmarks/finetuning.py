@@ -17,6 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import torch
 from jaxtyping import UInt8
+from matplotlib.figure import Figure
 from torch import Generator, Tensor
 
 from benchmarks.results import CLONE, Page, UsedNetwork, radarhd, script, tracked
@@ -64,7 +65,6 @@ GROUPS = {
     "another building": (227, 230, 233, 237, 242),
     "standing still": (248, 250),
 }
-PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "finetuning.png"
 
 
 class Seen:
@@ -134,7 +134,7 @@ def dense(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
 def train(options: argparse.Namespace) -> None:
     """Make the weights that are not there yet."""
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    plan = {key: options.steps or steps for key, steps in STEPS.items() if not _path(options.out, *key).is_file()}
+    plan = {key: options.steps or steps for key, steps in STEPS.items() if not _path(options.weights, *key).is_file()}
     done = count(1)
     with progress("steps") as report:
         for (shown, how), steps in plan.items():
@@ -145,8 +145,8 @@ def train(options: argparse.Namespace) -> None:
             net.dense.fill_(dense(net, seen, header.frames))
             metrics = {"minutes": sum(walk.frames for walk in walks) * PERIOD / 60}
             data = f"{shown} real walks" + (f" after {header.data}" if how == "tuned" else "")
-            _path(options.out, shown, how).parent.mkdir(parents=True, exist_ok=True)
-            save(net, header.model_copy(update={"data": data, "metrics": metrics}), _path(options.out, shown, how))
+            _path(options.weights, shown, how).parent.mkdir(parents=True, exist_ok=True)
+            save(net, header.model_copy(update={"data": data, "metrics": metrics}), _path(options.weights, shown, how))
 
 
 def window(walk: Walk, end: int, frames: int) -> UInt8[np.ndarray, "frame range azimuth"]:
@@ -169,7 +169,7 @@ def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distanc
     return found, header
 
 
-def draw(rows: list[dict]) -> None:
+def draw(rows: list[dict]) -> Figure:
     """Error over minutes, with and without simulation before."""
     figure, axes = plt.subplots(1, len(GROUPS), figsize=(11, 3.2), sharey=True)
     for axis, group in zip(axes, GROUPS, strict=True):
@@ -181,7 +181,7 @@ def draw(rows: list[dict]) -> None:
     axes[0].set(ylabel="Chamfer distance, m", ylim=(0, None))
     axes[0].legend()
     figure.tight_layout()
-    figure.savefig(PICTURE, dpi=90)
+    return figure
 
 
 @script(
@@ -189,13 +189,13 @@ def draw(rows: list[dict]) -> None:
     data=CLONE,
     start=(Weights().of("pictures"), "weights that were trained in simulation"),
     steps=(0, "of each training; as many as it is worth if 0"),
-    out=(Path("tuned"), "folder of the weights"),
+    weights=(Path("tuned"), "folder of the weights"),
     every=(6, "of so many frames of the test walks one is judged"),
 )
 def main(options: argparse.Namespace) -> Page:
     train(options)
     walks = Walk.tests(options.data)
-    paths = {(0, "simulation"): options.start} | {key: _path(options.out, *key) for key in STEPS}
+    paths = {(0, "simulation"): options.start} | {key: _path(options.weights, *key) for key in STEPS}
     rows = []
     for (shown, how), path in tracked([*paths.items()], "judging"):
         found, header = judged(walks, path, options.every)
@@ -204,9 +204,9 @@ def main(options: argparse.Namespace) -> Page:
             mean = np.mean([getattr(found[walk], by) for walk in some if walk in found])
             row[place if by == "instant" else f"{place}, by number"] = mean
         rows.append(row)
-    draw(rows)
     return Page(
         rows,
+        figure=draw(rows),
         data=radarhd("RadarHD's test walks", walks),
         networks=tuple(UsedNetwork.of(path) for path in paths.values()),
         notes=[

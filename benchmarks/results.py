@@ -1,14 +1,17 @@
-"""What all scripts share: their options, and where they put their figures, a page each, with all that
-`radarize.evaluation.benchmark.results` wants it to say."""
+"""What all scripts share: their options, and how they write what they found, with all that
+`radarize.evaluation.benchmark.results` wants it to say. `benchmarks.make` joins what several found to a page."""
 
 import argparse
 import inspect
 import os
 import resource
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeVar
+
+from matplotlib.figure import Figure
 
 from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, machine
 from radarize.evaluation.benchmark.table import Beside, Table
@@ -18,7 +21,8 @@ from radarize.io.jobs import Job, perform
 from radarsim.motion.statistics import Statistics
 from radarsim.motion.trajectory import Motion
 
-FOLDER = Path(__file__).parent / "results"
+#: Of what scripts and `radarize benchmark` found, a JSON file each.
+PARTS = Path(__file__).parent / "results" / "parts"
 #: Captures and logs that others made, beside the checkout.
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
 #: Options of scripts that judge real walks.
@@ -37,6 +41,7 @@ class Page(NamedTuple):
         notes: sentences below the table.
         networks: that the figures are of.
         beside: whose figures stand beside ours.
+        figure: of them; None: there is none.
     """
 
     rows: Sequence[Mapping[str, object]]
@@ -44,12 +49,13 @@ class Page(NamedTuple):
     notes: Sequence[str]
     networks: tuple[UsedNetwork, ...] = ()
     beside: Sequence[Beside] = ()
+    figure: Figure | None = None
 
 
 def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], None]]:
     """Make a script of the function below, the last one of its file, from options to what is published.
 
-    The table is written into ``benchmarks/results`` under the file's name, and printed. `main.parser` has the options.
+    What it found is written under the file's name, and printed. `main.parser` has the options.
 
     Args:
         title: heading.
@@ -57,17 +63,27 @@ def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], No
             stands for a flag, and ``{"nargs": "?"}`` makes a positional argument.
     """
 
-    def of(work: Callable[[argparse.Namespace], Page | None]) -> Callable[[], None]:
+    def of(work: Callable[[argparse.Namespace], Page | tuple[Results, Figure] | None]) -> Callable[[], None]:
         name = Path(inspect.getfile(work)).stem
 
         def main() -> None:
-            if (page := work(main.parser.parse_args())) is not None:
-                table = Table(title, list(page.rows), list(page.notes), tuple(page.beside))
-                results = Results(title, [table], page.data, page.networks, command(f"python -m benchmarks.{name}"))
-                print(results.write(FOLDER, name).read_text())
+            given = main.parser.parse_args()
+            if (found := work(given)) is None:
+                return
+            if isinstance(found, Page):
+                figure, table = found.figure, Table(title, list(found.rows), list(found.notes), tuple(found.beside))
+                results = Results(title, [table], found.data, found.networks, typed(name))
+            else:
+                results, figure = found
+            given.out.mkdir(parents=True, exist_ok=True)
+            if figure is not None:
+                figure.savefig(given.out / f"{name}.png", dpi=90)
+                results.notes.append(f"![{title}]({given.out.name}/{name}.png)")
+            results.save(given.out / f"{name}.json")
+            print(results.markdown())
 
         main.parser = argparse.ArgumentParser(description=inspect.getmodule(work).__doc__)
-        for option, (default, words, *more) in options.items():
+        for option, (default, words, *more) in (options | {"out": (PARTS, "folder to write")}).items():
             kind, value = (default, None) if isinstance(default, type) else (type(default), default)
             how = {"action": "store_true"} if default is False else {"type": kind, "default": value}
             how |= more[0] if more else {}
@@ -78,6 +94,14 @@ def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], No
         return main
 
     return of
+
+
+def typed(name: str) -> str:
+    """The command that a script was begun with; where it writes is the machine's business."""
+    words = [*sys.argv]
+    if "--out" in words:
+        del words[(at := words.index("--out")) : at + 2]
+    return command(f"python -m benchmarks.{name}", words[1:])
 
 
 def tracked(items: Sequence[T], title: str) -> Iterator[T]:

@@ -142,7 +142,7 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[NamedWalk]]:
     settings; and what they are of."""
     paths = sorted(path.parent for path in folder.glob(f"*/{Pair(**BEST)}/reference.tum"))
     if not paths:
-        raise SystemExit(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `benchmarks.unseen` keeps")
+        raise SystemExit(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `radarize benchmark walks` keeps")
     radar = SlamConfig.preset("radar")
     cases = {
         "radar": radar,
@@ -170,7 +170,7 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[NamedWalk]]:
 
 @script(
     "SLAM back end",
-    data=(Path, "folder of runs that `benchmarks.unseen` keeps; lidar and graphs alone if none"),
+    data=(Path, "folder of runs that `radarize benchmark walks` keeps; lidar and graphs alone if none"),
     seeds=(3, "of disturbances, for each log"),
     seed=(7, "the first of them"),
 )

@@ -5,10 +5,12 @@
     buildings:
       A: {kind: A, seed: 3}            # as `building` in a scene file; `floors` below picks a floor
       B: {kind: B, seed: 3, clutter: 1, unevenness: 1}                  # both as in a scene file, and interferers too
+      C: {kind: C, seeds: [101, 108]}  # eight buildings, C101 to C108
       shop: shop.yaml                  # a scene of the project, or a scene file beside this one
     recordings:
       - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
       - {building: shop, platform: [cart, robot], count: 2, duration: 20, people: 3, variants: [plain]}
+      - {building: C*, platform: cart, count: 1, duration: 40, by_turns: true}  # C101 plain, C102 coarse, ...
     radar: radarize                    # preset or .cfg file
     frontend: board.yaml               # as `radarsim calibrate` writes it; the board's own by default
     sensors: [depth, imu]              # or all, or none
@@ -29,6 +31,7 @@ whatever order it is made. Recordings can go through `waypoints` ([[x, y], ...],
 of the data set, of recordings or of a variant, become attributes of the files.
 """
 
+import fnmatch
 import hashlib
 from collections import Counter
 from collections.abc import Iterator
@@ -37,7 +40,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from radarize.io.errors import InputError
 from radarize.io.files import within
@@ -64,7 +67,7 @@ class Recordings(Frozen):
     """Some recordings of one building.
 
     Attributes:
-        building: a name of `Specification.buildings`.
+        building: a name of `Specification.buildings`, or a pattern that some of them match (`fnmatch`).
         floors: used in turn; none for buildings without floors.
         platform: one, or several with `count` recordings each.
         count: recordings per platform.
@@ -72,10 +75,11 @@ class Recordings(Frozen):
         waypoints: to go through instead of a tour, m.
         people: pedestrians near the radar's path in each.
         variants: some of `Specification.variants`; all if none is named.
+        by_turns: one of the variants for each building that matches, in turn, instead of all of them.
         attributes: of the recordings.
     """
 
-    building: Name
+    building: Annotated[str, Field(pattern=r"^[A-Za-z0-9*?!\[\]-]+$")]
     floors: tuple[Annotated[int, Field(ge=0)], ...] = ()
     platform: Platform | tuple[Platform, ...]
     count: int = Field(gt=0)
@@ -83,6 +87,7 @@ class Recordings(Frozen):
     waypoints: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)] | None = None
     people: int = Field(0, ge=0, le=50)
     variants: tuple[Name, ...] = ()
+    by_turns: bool = False
     attributes: Attributes = {}
 
     @property
@@ -115,6 +120,41 @@ class Specification(Frozen):
     randomise: Randomise = Field(default_factory=Randomise.usual)
     splits: dict[Name, Split] = {}
     _folder: Path = Path()
+
+    @field_validator("buildings", mode="before")
+    @classmethod
+    def _each_seed(cls, given: object) -> object:
+        """Buildings with `seeds`, first and last, as so many buildings."""
+        if not isinstance(given, dict):
+            return given
+        found: dict[str, object] = {}
+        for name, about in given.items():
+            seeds = about.get("seeds") if isinstance(about, dict) else None
+            if seeds is None:
+                found[name] = about
+                continue
+            if not (isinstance(seeds, list) and len(seeds) == 2 and all(type(seed) is int for seed in seeds)):
+                raise ValueError(f"seeds of {name} are {seeds}, expected [first, last]")
+            if not 0 <= seeds[1] - seeds[0] < MOST:
+                raise ValueError(f"seeds of {name} are {seeds}, expected [first, last], at most {MOST} of them")
+            kept = {key: value for key, value in about.items() if key != "seeds"}
+            found |= {f"{name}{seed}": {**kept, "seed": seed} for seed in range(seeds[0], seeds[1] + 1)}
+        return found
+
+    @model_validator(mode="after")
+    def _each_building(self) -> "Specification":
+        """Recordings of a pattern as those of each building that matches."""
+        groups: list[Recordings] = []
+        for group in self.recordings:
+            names = (
+                [group.building] if group.building in self.buildings else fnmatch.filter(self.buildings, group.building)
+            )
+            turns = group.variants or tuple(self.variants)
+            for k, name in enumerate(names or [group.building]):
+                mine = {"variants": (turns[k % len(turns)],), "by_turns": False} if group.by_turns and turns else {}
+                groups.append(group.model_copy(update={"building": name, **mine}))
+        object.__setattr__(self, "recordings", tuple(groups))
+        return self
 
     @model_validator(mode="after")
     def _consistent(self) -> "Specification":

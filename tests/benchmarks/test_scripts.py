@@ -1,41 +1,13 @@
-"""The scripts write pages that say what they are of; those that take little time run here."""
+"""A script writes what it found, and what it is of, where it is told to."""
 
-import importlib
-from pathlib import Path
-
-import pytest
-
-from benchmarks import results
+from benchmarks import motion_statistics
 from radarize.evaluation.benchmark.results import Results
-from radarsim.recording.simulate import simulate
-from radarsim.world.scene import Scene
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory) -> Path:
-    """A second of the bare office, which takes less time to begin."""
-    bare = Scene.of({"building": {"kind": "office", "seed": 7}, "clutter": 0, "unevenness": 0}, "office")
-    path = tmp_path_factory.mktemp("data") / "office.h5"
-    return simulate(bare, path, duration=1.0, seed=4)
-
-
-@pytest.mark.parametrize(
-    ("script", "words"),
-    [
-        ("claims", ["--data", "{walk.parent}"]),
-        ("motion_statistics", ["--buildings", "1"]),
-        ("path_types", ["--frames", "2"]),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_a_script_writes_its_page(script, words, walk, tmp_path, monkeypatch, capsys):
-    module = importlib.import_module(f"benchmarks.{script}")
-    words = [word.format(walk=walk) for word in words]
-    monkeypatch.setattr("sys.argv", [script, *words])
-    monkeypatch.setattr(results, "FOLDER", tmp_path)
-    monkeypatch.setattr(module, "SCENES", ("office",), raising=False)  # the smallest
-    module.main()
-    page = Results.read(tmp_path / f"{script}.json")
-    assert page.tables[0].rows and page.data.walks
-    assert page.command.startswith(f"python -m benchmarks.{script} ")
-    assert page.markdown() in capsys.readouterr().out
+def test_a_script_writes_its_part(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["motion_statistics", "--buildings", "1", "--out", str(tmp_path)])
+    motion_statistics.main()
+    part = Results.read(tmp_path / "motion_statistics.json")
+    assert part.tables[0].rows and part.data.walks
+    assert part.command == "python -m benchmarks.motion_statistics --buildings 1"
+    assert part.markdown() in capsys.readouterr().out

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import transfer
 from radarize.evaluation.benchmark.dataset import DataSet
 from radarize.evaluation.benchmark.followed import FrameErrors
 from radarize.evaluation.benchmark.runs import figures
@@ -67,11 +66,3 @@ def test_wrong_returns_have_a_cause(judged):
     assert 0.05 < wrong < 0.6
     assert sum(found["sources"].values()) == pytest.approx(wrong, abs=1e-6)
     assert found["sources"]["ghosts"] < 0.1
-
-
-def test_a_frame_is_far_from_others_only_if_it_is_unlike_them():
-    rng = np.random.default_rng(0)
-    maps = rng.normal(0, 5, (10, 32, 40))
-    like, among = transfer.distances(maps, rng.normal(0, 5, (1, 32, 40)))
-    unlike, _ = transfer.distances(maps, rng.normal(0, 8, (1, 32, 40)))
-    assert like < 1.5 * among.max() and unlike > 3 * among.max()

@@ -45,15 +45,6 @@ NOTES = (
     "0.27 s 1 deg, NEES 0.8 to 1.25.",
 )
 SEEN = "Shipped networks learned from walks by hand, by cart and by robot; with --train none has seen these platforms."
-#: s: spans of turns; 0: from frame to frame.
-HORIZONS = (0, 4 / 15, 1, 5, 15, 40)
-CLAIMS = (
-    "NEES: squared error over the claimed variance, per dimension, 1 if that is right, of all frames (no mean over "
-    "recordings); median: over its expectation.",
-    "Turns over any time: errors of headings that are corrected later are no drift (`radarize.odometry.uncertainty`); "
-    "of methods without such errors, variances of frames are added as independent.",
-    "To reach: 0.9 to 1.1 for velocities, mean and median, on every platform.",
-)
 
 
 def tables(study: Study, paper: dict[str, tuple[float, ...]] = PAPER) -> list[Table]:
@@ -99,23 +90,3 @@ def row(runs: pd.DataFrame, found: Sequence[FrameErrors]) -> dict[str, object]:
         "NEES yaw step": turn_nees(found, 0),
         "NEES yaw over 0.27 s": turn_nees(found, WINDOW),
     }
-
-
-def claims_tables(study: Study) -> list[Table]:
-    """A row for every odometry on each platform, in each building and on all."""
-    read = cache(lambda run: FrameErrors.read(study.output / run.place))
-    rows = [
-        {"odometry": pair.odometry, **group, **_claims(list(map(read, runs["run"])))}
-        for pair, group, runs in study.by_group()
-    ]
-    return [Table("Claimed uncertainty against errors", rows, list(CLAIMS))]
-
-
-def _claims(found: list[FrameErrors]) -> dict[str, float]:
-    frames = joined(found)
-    velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
-    row = {"velocity": velocity["nees"], "velocity, median": velocity["nees_median"]}
-    for seconds in HORIZONS:
-        name = f"turn over {seconds:.2g} s" if seconds else "turn from frame to frame"
-        row[name] = turn_nees(found, seconds)
-    return row

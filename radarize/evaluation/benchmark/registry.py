@@ -6,7 +6,7 @@ all of them.
 
 from functools import partial
 
-from radarize.evaluation.benchmark import mapping, odometry, radars, runtime, slam, varied
+from radarize.evaluation.benchmark import mapping, odometry, radars, runtime, slam, varied, walks
 from radarize.evaluation.benchmark.drawings import draw
 from radarize.evaluation.benchmark.study import Benchmark, Chosen
 
@@ -44,12 +44,14 @@ BUILDINGS = Benchmark(
     "building",
     draw=draw,
 )
-UNCERTAINTY = Benchmark(
-    "Claimed uncertainty",
-    "Squared errors of velocities and turns over the variances that odometry claims; 1 if it knows itself.",
-    Chosen.by_odometry,
-    odometry.claims_tables,
+WALKS = Benchmark(
+    "Odometry and SLAM on test walks",
+    "Errors of each method, whether it knows them, and the walks where SLAM is worst.",
+    walks.pairs,
+    walks.tables,
     "random",
+    draw=draw,
+    picture=lambda study, tables: walks.worst(study),
 )
 RUNTIME = Benchmark(
     "Run time",

@@ -148,9 +148,12 @@ def commit(source: Path) -> str:
     return f"{git('rev-parse', '--short', 'HEAD')} ({state})"
 
 
-def command(name: str) -> str:
-    """A program's name with the arguments of this process; folders are the machine's business, not the reader's."""
-    words = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:]]
+def command(name: str, words: Sequence[str] | None = None) -> str:
+    """A program's name with its arguments, those of this process unless told; folders are the machine's business, not
+    the reader's."""
+    words = [
+        Path(word).name if Path(word).is_absolute() else word for word in (sys.argv[1:] if words is None else words)
+    ]
     return " ".join([name, shlex.join(words)]) if words else name
 
 
@@ -223,6 +226,13 @@ class Results:
             InputError: they cannot be written.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        content = TypeAdapter(Results).dump_json(self, indent=1).decode()
-        write_whole(folder / f"{name}.json", content + "\n")
+        self.save(folder / f"{name}.json")
         return write_whole(folder / f"{name}.md", self.markdown())
+
+    def save(self, path: Path) -> Path:
+        """Write all of it as JSON.
+
+        Raises:
+            InputError: it cannot be written.
+        """
+        return write_whole(path, TypeAdapter(Results).dump_json(self, indent=1).decode() + "\n")

@@ -68,11 +68,11 @@ def benchmark(
 
 def _publish(name: str, study: Study) -> Results:
     results = study.publish()
-    if (figure := study.benchmark.picture(results.tables)) is not None:
+    if (figure := study.benchmark.picture(study, results.tables)) is not None:
         with replacing(study.output / f"{name}.png") as part:
             figure.savefig(part, format="png", dpi=70, bbox_inches="tight")
         pyplot.close(figure)
-        results.notes.append(f"![Curves]({name}.png)")
+        results.notes.append(f"![{results.title}]({name}.png)")
     results.write(study.output, name)
     write_page(study, results, study.output / f"{name}.html")
     return results

@@ -113,7 +113,7 @@ class Benchmark:
         timed: it measures time, on the first recording.
         lacks: what a data set must have and has not, as a sentence.
         draw: sections of its page below the tables.
-        picture: of its tables, beside them; None: there is none.
+        picture: beside its tables, which it is given, too; None: there is none.
     """
 
     title: str
@@ -124,7 +124,7 @@ class Benchmark:
     timed: bool = False
     lacks: Callable[[DataSet], str] = lambda data: ""
     draw: Callable[["Study", Page], None] = lambda study, page: None
-    picture: Callable[[list[Table]], Figure | None] = lambda tables: None
+    picture: Callable[["Study", list[Table]], Figure | None] = lambda study, tables: None
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ class Panels:
         labels = rows[[self.panel, self.over, self.line]]
         return Table(title, pd.concat([labels, in_words(rows)], axis=1).to_dict("records"))
 
-    def picture(self, tables: Sequence[Table]) -> Figure | None:
+    def picture(self, _: Study, tables: Sequence[Table]) -> Figure | None:
         """Curves of the last table; None without any. Values that are no numbers have none."""
         frame = tables[-1].frame.rename(columns={figure.title: name for name, figure in FIGURES.items()})
         frame = frame[frame[self.over].map(lambda value: isinstance(value, int | float))]
@@ -85,7 +85,7 @@ class Panels:
 
     def draw(self, study: Study, page: Page) -> None:
         """The same on a page."""
-        if (figure := self.picture(study.benchmark.tables(study))) is not None:
+        if (figure := self.picture(study, study.benchmark.tables(study))) is not None:
             page.section("Curves", f"Figures over {self.over}, a column for each {self.panel}.")
             page.picture(figure)
 

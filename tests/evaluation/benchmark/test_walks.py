@@ -1,0 +1,31 @@
+"""What odometry claims of its poses."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from radarize.evaluation.benchmark.walks import pose_nees
+from radarize.io.pose import compose
+from radarize.odometry.uncertainty import ErrorModel, MotionCovariance
+
+FRAMES, WALKS = 40, 400
+
+
+def test_claims_of_steps_add_up_to_those_of_poses(monkeypatch):
+    """Steps of a walk in a curve whose errors are drawn as claimed: 1 over any span, and 4 if they claim half."""
+    monkeypatch.setattr("radarize.odometry.uncertainty.MotionCovariance", partial(MotionCovariance, scale=0.0))
+    rng = np.random.default_rng(0)
+    half = np.array([[0.002, 0.0, 0.0], [0.0006, 0.001, 0.0], [0.0, 0.0004, 0.001]])
+    step, steps = np.array([0.1, 0.02, 0.08]), np.broadcast_to(half @ half.T, (FRAMES, 3, 3))
+    true, poses = np.zeros((2, FRAMES, WALKS, 3))
+    for k in range(1, FRAMES):
+        true[k] = compose(true[k - 1], step)
+        poses[k] = compose(compose(poses[k - 1], step), rng.normal(size=(WALKS, 3)) @ half.T)
+    for length in (5, FRAMES - 1):
+        walks = range(WALKS)
+        claims = ErrorModel.independent(steps)
+        found = [pose_nees(poses[:, walk], true[:, walk], claims, range(1), length) for walk in walks]
+        assert np.mean(found) == pytest.approx(1, abs=0.1)
+    quarter = pose_nees(poses[:, -1], true[:, -1], ErrorModel.independent(steps / 4), range(1), FRAMES - 1)
+    assert quarter == pytest.approx(4 * found[-1])

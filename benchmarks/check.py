@@ -125,15 +125,16 @@ def real() -> Iterator[tuple[str, Check]]:
 
 @script(
     "Faults found by radarize check",
-    folder=(Path("check"), "of the recordings, which are made if they are not there"),
+    folder=(Path("build/check"), "of the recordings, which are made if they are not there"),
     set=("test", "tuning, or test"),
+    few=(0, "walks; all if 0"),
     only=("", "parts of names of faults, comma-separated; all if none"),
     workers=(2, "processes"),
 )
 def main(options: argparse.Namespace) -> Page:
     """All faults in all walks."""
     about = read_beside(__file__)
-    walks = list(trials(about[options.set], about["boards"], options.folder))
+    walks = list(trials(about[options.set], about["boards"], options.folder))[: options.few or None]
     names = [name for name in FAULTS if any(word in name for word in options.only.split(","))]
     options.folder.mkdir(parents=True, exist_ok=True)
     performed({str(walk.seed): walk.record for walk in walks}, options.workers, "recordings")

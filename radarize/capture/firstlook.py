@@ -1,6 +1,6 @@
 """A check of the first seconds of a stream, beside the pipeline."""
 
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 import numpy as np
 from jaxtyping import Bool, Float, Int16
@@ -37,10 +37,20 @@ class FirstLook:
             return
         self._kept.append((adc.copy(), times.copy(), valid.copy()))
         if sum(len(each[1]) for each in self._kept) >= self._wanted:
-            frames, self._kept = self._kept, []
-            worker = ThreadPoolExecutor(1, thread_name_prefix="check")
-            self._found = worker.submit(self._check, frames)
-            worker.shutdown(wait=False)
+            self._begin()
+
+    def finish(self) -> None:
+        """Check what came, if the stream ends before there was enough, and wait until that is done."""
+        if self._found is None and self._kept:
+            self._begin()
+        if self._found is not None:
+            wait([self._found])
+
+    def _begin(self) -> None:
+        frames, self._kept = self._kept, []
+        worker = ThreadPoolExecutor(1, thread_name_prefix="check")
+        self._found = worker.submit(self._check, frames)
+        worker.shutdown(wait=False)
 
     def _check(self, kept: list[tuple[np.ndarray, ...]]) -> list[str]:
         adc, times, valid = map(np.concatenate, zip(*kept, strict=True))

@@ -115,6 +115,7 @@ class Live:
             if result is not None:
                 yield came, result
         self.pipeline.finish()
+        self.first_look.finish()
         self._show_map()
         self._drawn.result()
         self._painter.shutdown()

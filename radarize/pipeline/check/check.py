@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 from radarize.io.errors import InputError
 from radarize.io.load import Source, frames_of
 from radarize.io.recording import Clip, Recording
-from radarize.pipeline.check.evidence import Evidence
+from radarize.pipeline.check.evidence import PLACES, Evidence
 from radarize.pipeline.check.faults import TESTS, Test
 from radarize.pipeline.check.finding import Finding, NotObservable
 from radarize.pipeline.check.summary import Sequence
@@ -112,10 +112,13 @@ def _looked_at(frames: Clip) -> "Check":
     known = _CHECKED.setdefault(recording, {})
     if span not in known:
         evidence = Evidence.of(recording[span.start : span.stop])
+        evidence.places = _PLACES
         known[span] = check_evidence(evidence, [test for test in TESTS if not test.whole])
     return known[span]
 
 
+#: At which frames are looked at closely before a run: half of those of a check, in half its time.
+_PLACES = PLACES // 2
 #: What was found in open recordings, by the span of frames.
 _CHECKED: WeakKeyDictionary[Recording, dict[range, Check]] = WeakKeyDictionary()
 

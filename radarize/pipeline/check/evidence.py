@@ -38,7 +38,12 @@ class Evidence:
         truth: true poses, where they are known.
         imu: where there is one.
         numbers: of the frames in the recording; from 0 if None.
+
+    Attributes:
+        places: at which frames are looked at closely.
     """
+
+    places = PLACES
 
     def __init__(
         self,
@@ -89,7 +94,9 @@ class Evidence:
                 samples = np.concatenate([read(k, k + 1) for k in order[first:last]])
             return samples if change is None else change(samples)
 
-        return Evidence(config, times, valid, mend, self.truth, self.imu, numbers)
+        mended = Evidence(config, times, valid, mend, self.truth, self.imu, numbers)
+        mended.places = self.places
+        return mended
 
     def read(self, start: int, stop: int) -> Frames:
         """Frames start...stop-1."""
@@ -99,7 +106,7 @@ class Evidence:
     @cached_property
     def chosen(self) -> Int[np.ndarray, "frame"]:
         """Numbers of the frames looked at closely, without lost and silent ones."""
-        starts = np.unique(np.linspace(0, max(len(self) - RUN, 0), PLACES).astype(int))
+        starts = np.unique(np.linspace(0, max(len(self) - RUN, 0), self.places).astype(int))
         near = np.unique((starts[:, None] + np.arange(RUN)).clip(max=len(self) - 1))
         return near[self.valid[near].mean(axis=(1, 2)) > 0.5]
 

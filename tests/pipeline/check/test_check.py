@@ -124,7 +124,7 @@ def test_repeated_frames_are_left_out(whole, tmp_path):
 def test_streams_come_along(path, whole, tmp_path):
     """An IMU as it was, and poses; rows of frames with their frames."""
     with Recording(path) as source:
-        mending = Mending(order=np.arange(len(source))[::-1])
+        mending = Mending(order=np.arange(len(source))[::-1], keeps_stamps=True)
         write_mended(source[:], (Finding("x", "y", 1.0, "z", mending),), tmp_path / "right.h5")
         with Recording(tmp_path / "right.h5") as right:
             np.testing.assert_array_equal(right.read("imu/gyroscope"), source.read("imu/gyroscope"))

@@ -20,6 +20,8 @@ _FRAMES, _AROUND = 20, 8
 _FALLS = 0.08
 #: Share of frames whose two likest are not the next ones, from which on frames are shuffled.
 _SHUFFLED = 0.25
+#: Frames that are sorted, at most: what it takes grows with their square.
+_SORTED = 5000
 #: Correlation with the frame before below which the radar has jumped, if it is less by so much than that around.
 _JUMP, _LESS = 0.5, 0.25
 
@@ -59,9 +61,11 @@ def shuffled(evidence: Evidence) -> Iterator[Finding]:
     looks = evidence.sequence.looks[seen]
     share = _out_of_order(_similar(looks))
     if share > _SHUFFLED:
-        order = seen[_sorted(looks)]
-        better = _out_of_order(_similar(evidence.sequence.looks[order]))
-        mending = Mending(order=_forward(evidence, order), keeps_stamps=True) if better < share / 4 else None
+        mending = None
+        if len(seen) <= _SORTED:
+            order = seen[_sorted(looks)]
+            if _out_of_order(_similar(evidence.sequence.looks[order])) < share / 4:
+                mending = Mending(order=_forward(evidence, order), keeps_stamps=True)
         yield Finding(
             "frames shuffled", f"{share:.0%} of the frames are most like others than the ones next to them",
             sureness(share, _SHUFFLED), "look at what made the file: frames were not sorted by their number",

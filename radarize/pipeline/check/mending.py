@@ -73,6 +73,9 @@ def _write_recording(frames: Clip, evidence: Evidence, output: Path, kinds: list
                 for name, each in streams.items()
                 if each.clock == "radar/time"
             }
+            # Instants of what belongs to frames go with the frames' stamps.
+            later = evidence.times[part] - source.times[evidence.numbers[part]]
+            rows |= {name: data + later for name, data in rows.items() if name.endswith("/time")}
             adc = evidence.read(part.start, part.stop)
             writer.append(adc, evidence.times[part], evidence.valid[part], rows=rows)
         for name, each in streams.items():

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from radarize.learning.torch_dataset import torch_dataset as torch_dataset
     from radarize.pipeline.calibration.calibration import Calibration as Calibration
     from radarize.pipeline.calibration.calibration import calibrate as calibrate
+    from radarize.pipeline.check.check import Check as Check
+    from radarize.pipeline.check.check import check as check
     from radarize.pipeline.maps import doppler_azimuth as doppler_azimuth
     from radarize.pipeline.maps import range_azimuth as range_azimuth
     from radarize.pipeline.maps import range_doppler as range_doppler
@@ -49,6 +51,8 @@ _HOMES = {
     "PointCloud": "pipeline.pointcloud",
     "Run": "pipeline.run",
     "calibrate": "pipeline.calibration.calibration",
+    "Check": "pipeline.check.check",
+    "check": "pipeline.check.check",
     "doppler_azimuth": "pipeline.maps",
     "estimate_odometry": "pipeline.odometry",
     "evaluate": "evaluation.evaluation",

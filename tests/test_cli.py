@@ -55,7 +55,7 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
-     "radarize config", "radarize report", "radarize benchmark", "radarize export", "radarize view",
+     "radarize check", "radarize config", "radarize report", "radarize benchmark", "radarize export", "radarize view",
      "radarsim simulate", "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene",
      "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate",
      "radarsim doctor"],

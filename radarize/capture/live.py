@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from radarize.capture.firstlook import FirstLook
 from radarize.capture.page import LivePage, Unwatched
 from radarize.capture.record import Keeper
 from radarize.capture.stream import FrameStream, follow
@@ -50,6 +51,7 @@ class Live:
     Attributes:
         losses: of the frames that came.
         health: of the pipeline.
+        first_look: check of the first seconds.
         busy: s spent on the frames so far, showing them included.
     """
 
@@ -60,6 +62,7 @@ class Live:
         self.preprocessor = Preprocessor(inputs.signal, inputs.every)
         self.view = LiveView(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(inputs.delivered.frame_period), Health(inputs.radar)
+        self.first_look = FirstLook(inputs.delivered)
         self._keeper: Keeper | None = None
         self.busy = 0.0
         self._frame_due = self._map_due = self._stamp = 0.0
@@ -102,6 +105,7 @@ class Live:
                 self.health.add(result)
                 self.view.add(result)
             self.losses.add(valid, stamps)
+            self.first_look.add(adc, stamps, valid)
             if keeper:
                 keeper.append(adc, stamps, valid)
             with self.pipeline.stopwatch.running(), stage("page"):
@@ -111,6 +115,7 @@ class Live:
             if result is not None:
                 yield came, result
         self.pipeline.finish()
+        self.first_look.finish()
         self._show_map()
         self._drawn.result()
         self._painter.shutdown()
@@ -119,7 +124,7 @@ class Live:
     def troubles(self, stream: FrameStream) -> list[str]:
         """What is wrong with the stream and its recording so far, and where odometry had a hard time."""
         left_out = self._keeper.warnings() if self._keeper else []
-        return [*stream.troubles(), *left_out, *self.health.warnings()]
+        return [*stream.troubles(), *left_out, *self.first_look.warnings(), *self.health.warnings()]
 
     def _show(self, stream: FrameStream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()

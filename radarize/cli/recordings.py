@@ -215,3 +215,27 @@ def info(recording: RecordingFile, as_json: AsJson = False) -> None:
 
     found = contents(recording)
     print(json.dumps(found, indent=2)) if as_json else show(found)
+
+
+@app.command()
+def check(
+    recording: RecordingFile,
+    fix: Annotated[
+        Path | None,
+        typer.Option(metavar="OUTPUT", help="Write a mended recording (.h5), or the right board's file (.yaml)."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find what is wrong with a recording: I and Q, antennas, chirps, frames, stamps. Exit code 1 if anything is.
+
+    Ten seconds of a walk are enough: radarize check walk.h5
+    """
+    from radarize.io.load import load
+    from radarize.pipeline.check.check import check
+
+    with load(recording) as source, working("checking"):
+        found = check(source, fix)
+    print(found.to_json() if as_json else found)
+    if fix is not None:
+        typer.echo(f"written: {fix}", err=True)
+    raise typer.Exit(0 if found.well else 1)

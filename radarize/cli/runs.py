@@ -38,6 +38,7 @@ def run_(
 ) -> None:
     """Estimate trajectory and map of a recording."""
     from radarize.io.load import load
+    from radarize.pipeline.check.check import warnings_before
     from radarize.pipeline.odometry import configuration
     from radarize.pipeline.run import run
     from radarize.signal.effort import effort
@@ -45,13 +46,14 @@ def run_(
     tuned = configuration(config)
     with load(recording, board=str(board) if board else None) as source:
         words = effort(source.config, len(source)) if source.has_samples else ""
-        warn([words] if words else [])
+        told = warnings_before(source[:])
+        warn([*([words] if words else []), *told])
         with progress("run", f"{output} is as it was before, and so is the recording") as report:
             made = run(
                 source[::every], output, odometry=odometry, scans=scans, settings=settings, weights=weights,
                 config=tuned, progress=report,
             )  # fmt: skip
-    warn(made.warnings)
+    warn([words for words in made.warnings if words not in told])
     print(made.path)
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from radarize.io.errors import InputError
 from radarize.io.recording import Clip
+from radarize.pipeline.check.check import warnings_after, warnings_before
+from radarize.pipeline.check.summary import Summary
 from radarize.pipeline.config import Configuration
 from radarize.pipeline.method import Inputs, Weights
 from radarize.pipeline.methods import make_pipeline
@@ -44,14 +46,15 @@ def run_recording(
         make_pipeline(inputs, methods["odometry"], methods["scans"]),
         Preprocessor(inputs.signal, inputs.every),
     )
-    source = frames.recording
+    source, warnings, summary = frames.recording, warnings_before(frames), Summary(frames.recording.config)
     with RunWriter(folder, source.config) as writer:
-        for result in pipeline.run(batches(frames, preprocessor, progress)):
+        for result in pipeline.run(batches(frames, preprocessor, progress, summary)):
             writer.add(result)
         if preprocessor.lost == preprocessor.taken:
             lost = f"all its {preprocessor.taken} frames are lost or silent"
             raise InputError(f"{source.path}: {lost}, expected one with samples")
-        writer.describe(frames, inputs.signal.heatmaps)
+        warnings += warnings_after(frames, summary.sequence) if source.has_samples else []
+        writer.describe(frames, inputs.signal.heatmaps, warnings)
         made = {**methods, **(facts or {})}
         if frames.numbers.step > 1:
             made["frames"] = f"one of {frames.numbers.step}"
@@ -79,9 +82,13 @@ def inputs_of(frames: Clip, weights: str | Path | None, configuration: Configura
 
 
 def batches(
-    frames: Clip, preprocessor: Preprocessor, progress: Callable[[int, int], None] = lambda done, total: None
+    frames: Clip,
+    preprocessor: Preprocessor,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    summary: Summary | None = None,
 ) -> Iterator[Batch]:
-    """Frames in batches; `progress` is called with how many have been used and how many there are, each N-th or not."""
+    """Frames in batches; `progress` is called with how many have been used and how many there are, each N-th or not;
+    `summary` takes in all of them."""
     source, span = frames.recording, frames.span
     size = together(source.config)
     for start in range(span.start, span.stop, size):
@@ -90,5 +97,8 @@ def batches(
         if pictured(source):
             yield preprocessor.process_maps({"picture": source.rows(PICTURE, start, stop)}, stamps)
         else:
-            yield preprocessor.process(source.adc(start, stop), stamps, source.valid(start, stop))
+            adc = source.adc(start, stop)
+            if summary is not None:
+                summary.add(adc)
+            yield preprocessor.process(adc, stamps, source.valid(start, stop))
         progress(stop - span.start, len(span))

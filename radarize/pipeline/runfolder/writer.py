@@ -5,7 +5,7 @@ import errno
 import json
 import platform as machine
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -103,8 +103,11 @@ class RunWriter:
         self.extend("errors/variance", track.errors.variance, "rad^2, m^2/s^2: of the errors of heading and velocity")
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
-    def describe(self, frames: Clip, heatmaps: Heatmaps) -> None:
+    def describe(self, frames: Clip, heatmaps: Heatmaps, warnings: Sequence[str] = ()) -> None:
         """Say what frames the run is of, with what is true of them, and keep heat maps of some for reports.
+
+        Args:
+            warnings: of the recording, which come first.
 
         Raises:
             InputError: the recording is damaged.
@@ -123,7 +126,7 @@ class RunWriter:
             "duration_s": float(times[-1] - times[0] + period),
             "blind": blindness.found.model_dump(),
             "health": [each.model_dump() for each in self.health.found],
-            "warnings": [*recording.damage, *self.health.warnings()],
+            "warnings": [*recording.damage, *warnings, *self.health.warnings()],
             "radar": recording.config.model_dump(mode="json"),
         }
         rows = np.searchsorted(recording.times + recording.config.burst_center, times[:])

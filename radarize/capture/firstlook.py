@@ -1,0 +1,64 @@
+"""A check of the first seconds of a stream, beside the pipeline."""
+
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+
+import numpy as np
+from jaxtyping import Bool, Float, Int16
+
+from radarize.pipeline.check.check import check_evidence
+from radarize.pipeline.check.evidence import Evidence
+from radarize.radar.config import RadarConfig
+
+#: s of frames that are looked at, and bytes that they may take.
+_LASTS, _MOST = 5.0, 128 << 20
+
+
+class FirstLook:
+    """Keeps the first frames until there are enough, and checks them in a thread; then it lets go of them.
+
+    Args:
+        config: of the radar.
+    """
+
+    def __init__(self, config: RadarConfig):
+        self._config = config
+        self._wanted = max(min(round(_LASTS / config.frame_period), _MOST // config.frame_bytes), 1)
+        self._kept: list[tuple[np.ndarray, ...]] = []
+        self._found: Future[list[str]] | None = None
+
+    def add(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        times: Float[np.ndarray, "frame"],
+        valid: Bool[np.ndarray, "frame loop tx"],
+    ) -> None:
+        """Take in the next frames."""
+        if self._found is not None:
+            return
+        self._kept.append((adc.copy(), times.copy(), valid.copy()))
+        if sum(len(each[1]) for each in self._kept) >= self._wanted:
+            self._begin()
+
+    def finish(self) -> None:
+        """Check what came, if the stream ends before there was enough, and wait until that is done."""
+        if self._found is None and self._kept:
+            self._begin()
+        if self._found is not None:
+            wait([self._found])
+
+    def _begin(self) -> None:
+        frames, self._kept = self._kept, []
+        worker = ThreadPoolExecutor(1, thread_name_prefix="check")
+        self._found = worker.submit(self._check, frames)
+        worker.shutdown(wait=False)
+
+    def _check(self, kept: list[tuple[np.ndarray, ...]]) -> list[str]:
+        adc, times, valid = map(np.concatenate, zip(*kept, strict=True))
+        evidence = Evidence(self._config, times, valid, lambda start, stop: adc[start:stop])
+        return check_evidence(evidence).warnings()
+
+    def warnings(self) -> list[str]:
+        """A sentence on each fault that was found; none as long as nobody knows."""
+        if self._found is None or not self._found.done() or self._found.exception():
+            return []
+        return self._found.result()

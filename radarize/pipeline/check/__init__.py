@@ -1,0 +1,1 @@
+"""Check a recording for the faults that its samples show: what is wrong, how sure, what mends it."""

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from radarize.radar.boards import load_board
-from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired, firing_name
 
 #: Antennas of a row that is not short; what velocities claim was fitted to rows of these.
 ROW = 8
@@ -103,7 +103,7 @@ def losses(config: RadarConfig) -> list[str]:
     found = []
     several = [firing for firing in config.tx_order if len(fired(firing)) > 1]
     if several:
-        names = " and ".join(f"TX{t + 1}" for t in fired(several[0]))
+        names = firing_name(several[0])
         found.append(
             f"{names} fire at once and count as one transmitter midway between them: their own directions are lost, of "
             f"{len(set().union(*map(fired, config.tx_order))) * len(config.rx)} virtual antennas "

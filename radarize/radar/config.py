@@ -29,6 +29,11 @@ def fired(firing: Firing) -> tuple[int, ...]:
     return (firing,) if isinstance(firing, int) else firing
 
 
+def firing_name(firing: Firing) -> str:
+    """Transmitters of a chirp as on the board: ``TX1``, ``TX1 and TX3``."""
+    return " and ".join(f"TX{transmitter + 1}" for transmitter in fired(firing))
+
+
 def antennas(count: int) -> str:
     """Numbers of so many antennas, as errors name them."""
     return ", ".join(map(str, range(count)))

@@ -23,7 +23,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.io.replacing import new_folder
 from radarize.radar.boards import load_board
-from radarize.radar.config import RadarConfig, fired
+from radarize.radar.config import RadarConfig, fired, firing_name
 from radarize.radar.dca1000 import encode
 
 #: The rigs' names of transmitters that fire: with two, the raised one in the middle of the row is left out.
@@ -45,7 +45,7 @@ def export_roverd(source: Path, output: Path, *, progress: Callable[[int, int], 
     with Recording(source) as recording, new_folder(output, "sequence") as folder:
         config = recording.config
         if config.tx not in _TRANSMITTERS:
-            names = ", ".join(f"TX{fired(tx)[0] + 1}" for tx in config.tx)
+            names = ", ".join(map(firing_name, config.tx))
             raise InputError(f"{source}: has {names}, expected TX1, TX1 and TX3, or all three, as the format has them")
         physical = config.model_copy(update={"tx_order": config.tx, "iq_order": "qqii"})
         sensor = folder / "radar"

@@ -24,7 +24,7 @@ from radarize.pipeline.calibration.tracks import tracks_of
 from radarize.pipeline.odometry import estimate_odometry
 from radarize.radar.boards import BOARDS, SUFFIXES, Board, Mounting, load_board
 from radarize.radar.cfg import write_cfg
-from radarize.radar.config import RadarConfig, fired
+from radarize.radar.config import RadarConfig, firing_name
 
 #: Frames that are used at most: a minute at 30 frames/s, for which all is solved at once.
 _LONGEST = 1800
@@ -78,7 +78,7 @@ class Calibration:
         gain, phase = np.moveaxis(self.errors, -1, 0)
         channels: list[tuple[object, ...]] = [
             (
-                f"TX{fired(tx)[0] + 1} RX{rx + 1}",
+                f"{firing_name(tx)} RX{rx + 1}",
                 f"{self.gains[i, j]:.2f} +- {gain[i, j]:.2f}",
                 f"{np.degrees(self.phases[i, j]):.1f} +- {np.degrees(phase[i, j]):.1f}",
             )

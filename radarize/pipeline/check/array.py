@@ -19,7 +19,7 @@ from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.orientation import mirrored
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.radar.boards import BOARDS, load_board
-from radarize.radar.config import RadarConfig
+from radarize.radar.config import RadarConfig, firing_name
 
 #: Standard deviations by which another array must explain the cells better; cells, and frames, that are needed.
 _SIGMAS, _CELLS, _FRAMES = 6.0, 150, 8
@@ -59,7 +59,7 @@ class Candidate:
 
 def candidates(config: RadarConfig) -> Iterator[Candidate]:
     """All arrays that the configured one may be mistaken for."""
-    names = [f"TX{t + 1}" for t in config.tx]
+    names = [firing_name(firing) for firing in config.tx]
     for order in [each for each in permutations(range(len(config.tx))) if list(each) != sorted(each)]:
         inverse = list(np.argsort(order))
         slots = [config.slot[k] for k in inverse]  # of physical transmitters, if chirps stayed where they are

@@ -6,6 +6,7 @@ import numpy as np
 
 from radarize.pipeline.check.evidence import Evidence
 from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.radar.config import firing_name
 from radarize.radar.noise import noise_floor, noise_profile
 
 #: Frames of which single samples are looked at: every so many-th.
@@ -114,7 +115,7 @@ def _copies(frames: np.ndarray, dead: np.ndarray, evidence: Evidence) -> Iterato
         )  # fmt: skip
     for a, b in copied:
         yield Finding(
-            "transmitter copied", f"the chirps of TX{tx[b] + 1} are those of TX{tx[a] + 1}", 1.0,
+            "transmitter copied", f"the chirps of {firing_name(tx[b])} are those of {firing_name(tx[a])}", 1.0,
             "look at what made the file",
         )  # fmt: skip
 
@@ -128,9 +129,9 @@ def transmitters(evidence: Evidence) -> Iterator[Finding]:
     usual = float(power.max())
     for k in np.flatnonzero(power < _DEAD * usual):
         yield Finding(
-            "transmitter dead", f"echoes of TX{tx[k] + 1} have {_decibels(power[k], usual):.0f} dB of the most",
+            "transmitter dead", f"echoes of {firing_name(tx[k])} have {_decibels(power[k], usual):.0f} dB of the most",
             sureness(_DEAD * usual / max(power[k], 1e-9), 1.0),
-            f"look at txEnable in chirpCfg and at the board, or leave TX{tx[k] + 1} out (--tx)",
+            f"look at txEnable in chirpCfg and at the board, or leave {firing_name(tx[k])} out (--tx)",
         )  # fmt: skip
 
 

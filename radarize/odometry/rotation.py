@@ -14,9 +14,9 @@ Three things decide what a frame looks like to the matcher (`MapRotation.feature
   above the wall's own texture, so the spectrum is limited per range-Doppler cell, and the streaks it leaves over range
   and azimuth are taken out by their medians.
 - Capon's ridges are sharper than windowed sums by far, and so is the match.
-- u_y = sin(azimuth) cos(elevation): what lies above and below seems nearer to the middle than it is. Elevations measured
-  per cell are too unsure to help, and one factor for all sines (`RotationConfig.stretch`) gains nothing in furnished
-  rooms.
+- u_y = sin(azimuth) cos(elevation): what lies above and below seems nearer to the middle than it is. Elevations
+  measured per cell are too unsure to help, and one factor for all sines (`RotationConfig.stretch`) gains nothing in
+  furnished rooms.
 """
 
 from dataclasses import dataclass, replace

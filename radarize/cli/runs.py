@@ -140,9 +140,9 @@ def export(
     """Write a recording or a run for other programs."""
     from radarize.io.exporters import export
 
-    warn(damage(source))
     with progress("export") as report:
         written = export(source, format, output, run=run, iq_order=iq_order, time_offset=time_offset, progress=report)
+    warn(damage(source))
     print(written)
 
 

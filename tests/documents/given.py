@@ -24,7 +24,6 @@ from tests.io.importers.test_import_pcap import pcap, stream
 DATASETS = {
     "small": {"A": ("handheld", "cart"), "B": ("robot",)},
     "radarize146": {"A": ("handheld", "cart"), "B": ("robot",)},
-    "evaluation": {"A": ("handheld", "cart")},
     "inertial": {"A101": ("handheld", "cart")},
     "stress": {"corner": ("cart",)},
     "radarhd": {"A401": ("cart", "handheld")},

@@ -19,7 +19,9 @@ CHIRPS = "chirpCfg {0} {0} 0 0 0 0 0 {1}"
 def text(*masks: int, loops: int = 8, extra: str = "") -> str:
     """A configuration whose chirps fire transmitters by these masks."""
     lines = [
-        line for line in write_cfg(PRESET).splitlines() if not line.startswith(("chirpCfg", "frameCfg", "% Board"))
+        line
+        for line in write_cfg(PRESET).splitlines()
+        if not line.startswith(("chirpCfg", "frameCfg", "% Board", "% Platform"))
     ]
     at = next(k for k, line in enumerate(lines) if line.startswith("profileCfg")) + 1
     chirps = [CHIRPS.format(k, mask) for k, mask in enumerate(masks)]

@@ -205,7 +205,8 @@ def test_ones_and_signs_are_no_measurement(pairs):
 
 
 def test_importers_and_variants_take_the_boards():
-    text = write_cfg(PRESET).replace("% Board:iwr1843boost", "% Platform:xWR68xx_AOP").replace("0 77 122", "0 60 122")
+    text = write_cfg(PRESET).replace("% Board:iwr1843boost\n", "").replace("0 77 122", "0 60 122")
+    text = text.replace("% Platform:xWR18xx", "% Platform:xWR68xx_AOP")
     assert signs(parse_cfg(text)) == [1, -1, 1, -1]
     given = Given(PRESET.changed("a", channel_calibration=MEASURED), overrides={"board": "iwr6843ods"})
     assert signs(given.configure("a.bin")[0]) == [1, -1, -1, 1]
@@ -215,7 +216,8 @@ def test_importers_and_variants_take_the_boards():
 def test_the_emulated_radar_is_on_the_board_that_was_asked_for(tmp_path, monkeypatch):
     """Commands name none."""
     (tmp_path / "aop.cfg").write_text(write_cfg(radar("iwr6843aop")))
-    sent = parse_cfg("\n".join((tmp_path / "aop.cfg").read_text().splitlines()[1:]))
+    written = (tmp_path / "aop.cfg").read_text().splitlines()
+    sent = parse_cfg("\n".join(line for line in written if not line.startswith("%")))
     assert sent.board == "iwr6843isk"
     seen = []
     monkeypatch.setattr("radarsim.emulator.simulation.Scenario", lambda *a, **_: seen.append(a[2]) or 1 / 0)

@@ -26,8 +26,9 @@ from radarize.radar.presets import load_config
 _LOOKED_AT, _PERIODS = 1 << 20, 1 << 21
 #: Times the configuration's loop that the samples' may be long: of three transmitters, where one is configured.
 _LONGEST = 3
-#: Share of the best correlation that a period has whose multiple is the best.
-_AS_GOOD = 0.9
+#: Share of the best correlation that a period has whose multiple is the best. From receiver to receiver it is up to 0.98
+#: in the static room of the public IWR6843 capture.
+_AS_GOOD = 0.99
 _PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
 
 
@@ -179,7 +180,8 @@ def other_period(data: bytes, config: RadarConfig) -> int | None:
     best = int(candidates[np.argmax(correlation[candidates])])
     if correlation[best] < 0.7 or correlation[loop] > 0.5 * correlation[best]:
         return None
-    parts = [best // count for count in (4, 3, 2) if best % (2 * count) == 0]  # a multiple of the period is as good
+    # A multiple of the period is as good; what is much shorter than a loop is from receiver to receiver.
+    parts = [best // count for count in (4, 3, 2) if best % (2 * count) == 0 and best // count >= candidates[0]]
     return next((part for part in parts if correlation[part] > _AS_GOOD * correlation[best]), best)
 
 

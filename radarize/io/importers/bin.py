@@ -26,8 +26,8 @@ from radarize.radar.presets import load_config
 _LOOKED_AT, _PERIODS = 1 << 20, 1 << 21
 #: Times the configuration's loop that the samples' may be long: of three transmitters, where one is configured.
 _LONGEST = 3
-#: Share of the best correlation that a period has whose multiple is the best. From receiver to receiver it is up to 0.98
-#: in the static room of the public IWR6843 capture.
+#: Share of the best correlation that a period has whose multiple is the best. From receiver to receiver it is up to
+#: 0.98 in the static room of the public IWR6843 capture.
 _AS_GOOD = 0.99
 _PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
 

@@ -5,6 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 import numpy as np
 from jaxtyping import Bool, Float, Int16
 
+from radarize.io.errors import first_line
 from radarize.pipeline.check.check import check_evidence
 from radarize.pipeline.check.evidence import Evidence
 from radarize.radar.config import RadarConfig
@@ -59,6 +60,8 @@ class FirstLook:
 
     def warnings(self) -> list[str]:
         """A sentence on each fault that was found; none as long as nobody knows."""
-        if self._found is None or not self._found.done() or self._found.exception():
+        if self._found is None or not self._found.done():
             return []
+        if (error := self._found.exception()) is not None:
+            return [f"the first seconds could not be checked ({first_line(error)})"]
         return self._found.result()

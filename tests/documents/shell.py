@@ -43,7 +43,8 @@ def do(words: list[str], folder: str, log: str) -> None:
     elif words[0] == "python":
         sys.path.insert(0, folder)
         sys.argv = words[1:]
-        runpy.run_path(words[1], run_name="__main__")
+        # By its whole path: processes that are spawned look for it where this one was begun.
+        runpy.run_path(os.path.join(folder, words[1]), run_name="__main__")
     else:
         sys.exit(subprocess.call([os.path.join(os.path.dirname(sys.executable), words[0]), *words[1:]]))
 

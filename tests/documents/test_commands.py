@@ -68,6 +68,7 @@ NOT_TYPED = {
     r"pip install .*": "tests/test_wheel.py installs the wheel",
     r"(ros2|python3|ros/bin/pip) .*": "needs ROS 2; tests/examples has its messages",
     r"make (docs|setup)": "makes an environment",
+    r"make results": "takes days",
     r"sudo .*": "changes the machine's network and groups",
     r"building: .*": "a line of a scene file, as scenes/buildings have it",
     r"scene = Scene\.of.*": "Python; tests/world/test_buildings.py has it",

@@ -298,7 +298,7 @@ def stamps(step: Callable[[RadarConfig], float]) -> Harm:
 
 
 def configured(**factors: float) -> Harm:
-    """Fields of the configuration that are off by factors."""
+    """Fields of the configuration with wrong values, by factors."""
 
     def harm(walk: Walk, rng: np.random.Generator) -> Walk:
         fields = {name: factor * getattr(walk.config, name) for name, factor in factors.items()}

@@ -105,7 +105,7 @@ def radars() -> str:
 
 
 def real() -> str:
-    """Distances of points on real walks by instant, and in brackets by number."""
+    """Distances of points on real walks matched by time, and in brackets matched by frame index."""
     found, lines = rows("real", "real walks"), []
     for method, words in METHODS.items():
         cells = []

@@ -41,6 +41,7 @@ TYPED_INSTEAD = (
     (r"^((?:radarsim dataset|radarize benchmark (?!list|real)).*)$", r"\1 --workers 1"),  # others take seconds to begin
     (r"^(radarsim twin .*)$", r"\1 --every 60"),
     (r"^(radarize train radarhd-pictures .*)$", r"\1 --frames 3"),  # two seconds are more than the walks have
+    (r"^(radarize train milliego .*)$", r"\1 --frames 2"),  # the walks have seven at 5 Hz
     (r"--nproc-per-node 4", "--nproc-per-node 1"),
     (r"^(radarize (?:capture|live) .*)$", r"\1 --duration 0.5"),
     # A cluster: tests/io/jobs and tests/dataset have one.

@@ -50,7 +50,7 @@ class Spoiled(Recording):
         c = self.config
         times = (np.arange(c.samples) - (c.samples - 1) / 2) / c.sample_rate
         shift = np.exp(4j * np.pi * c.slope * self.bias / SPEED_OF_LIGHT * times)
-        spoil = (self.factors[np.ix_(c.tx, c.rx)][..., None] * shift).astype(np.complex64)
+        spoil = (self.factors[c.channels][..., None] * shift).astype(np.complex64)
         iq = np.ascontiguousarray(super().adc(start, stop), np.float32).view(np.complex64)[..., 0] * spoil
         counts = np.clip(np.rint(iq.view(np.float32)), -32768, 32767).astype(np.int16)
         return counts.reshape(*iq.shape, 2)

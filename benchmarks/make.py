@@ -144,15 +144,14 @@ def common(folders: list[Path]) -> Path:
 
 def recordings(name: str, place: Place) -> Path:
     """The recordings of a data set, made as far as they are not there; a few short ones for a short trial."""
-    own, folder = HERE / f"{name}.yaml", place.work / "data" / name
-    plans = place.work / "plans"
+    folder, plans = place.work / "data" / name, place.work / "plans"
     plans.mkdir(parents=True, exist_ok=True)
-    text = (own if own.is_file() else ROOT / "scenes" / "datasets" / f"{name}.yaml").read_text()
+    source = next(beside for beside in (HERE, ROOT / "scenes" / "datasets") if (beside / f"{name}.yaml").is_file())
+    text = (source / f"{name}.yaml").read_text()
     for plan, log in PLANS.items():
         if f"{plan}.yaml" in text and not (plans / f"{plan}.yaml").is_file():
             import_scene(log, plans)
-    source = own if own.is_file() else ROOT / "scenes" / "datasets" / f"{name}.yaml"
-    for beside in source.parent.glob("*.cfg"):
+    for beside in source.glob("*.cfg"):
         shutil.copy(beside, plans)
     path = write_whole(plans / f"{name.replace('/', '-')}.yaml", shortened(text) if place.smoke else text)
     with progress(f"recordings of {name}") as report:

@@ -20,17 +20,24 @@ ROW = 8
 
 def tx_positions(config: RadarConfig) -> Float[np.ndarray, "tx 3"]:
     """Positions of the enabled transmitters in the sensor frame, m, physical order."""
-    layout = np.asarray(load_board(config.board).tx, float)
-    return _positions(config, np.array([layout[list(fired(firing))].mean(axis=0) for firing in config.tx]))
+    return _positions(config, layout(config)[0])
 
 
 def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
     """Positions of the enabled receivers in the sensor frame, m, physical order."""
-    return _positions(config, np.asarray(load_board(config.board).rx, float)[list(config.rx)])
+    return _positions(config, layout(config)[1])
 
 
-def _positions(config: RadarConfig, layout: Float[np.ndarray, "antenna 2"]) -> Float[np.ndarray, "antenna 3"]:
-    return np.column_stack([np.zeros(len(layout)), _half(config) * layout])
+def layout(config: RadarConfig) -> tuple[Float[np.ndarray, "tx 2"], Float[np.ndarray, "rx 2"]]:
+    """Left and up of the enabled transmitters and receivers, physical order, in half wavelengths at the board's design
+    frequency."""
+    board = load_board(config.board)
+    tx, rx = np.asarray(board.tx, float), np.asarray(board.rx, float)
+    return np.array([tx[list(fired(firing))].mean(axis=0) for firing in config.tx]), rx[list(config.rx)]
+
+
+def _positions(config: RadarConfig, places: Float[np.ndarray, "antenna 2"]) -> Float[np.ndarray, "antenna 3"]:
+    return np.column_stack([np.zeros(len(places)), _half(config) * places])
 
 
 def virtual_positions(config: RadarConfig) -> Float[np.ndarray, "tx rx 3"]:

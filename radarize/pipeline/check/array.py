@@ -8,7 +8,7 @@ worse by another array than by the one of the configuration.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.orientation import mirrored
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.radar.boards import BOARDS, load_board
-from radarize.radar.config import RadarConfig, firing_name
+from radarize.radar.config import RadarConfig, fired, firing_name
 
 #: Standard deviations by which another array must explain the cells better; cells, and frames, that are needed.
 _SIGMAS, _CELLS, _FRAMES = 6.0, 150, 8
@@ -34,6 +34,8 @@ _ALIKE = 1.5
 #: Cells that other arrays are tried on, at most; every N-th of them is enough for those that explain these worse by so
 #: many standard deviations.
 _TRIED, _FEW, _HOPELESS = 800, 5, -2.0
+#: Antennas of an axis, at most, of which every order is tried.
+_ALL = 4
 #: Hz: bands in which boards are taken for one another.
 _BAND = 70e9
 
@@ -60,12 +62,12 @@ class Candidate:
 def candidates(config: RadarConfig) -> Iterator[Candidate]:
     """All arrays that the configured one may be mistaken for."""
     names = [firing_name(firing) for firing in config.tx]
-    for order in [each for each in permutations(range(len(config.tx))) if list(each) != sorted(each)]:
+    for order in _orders(len(config.tx)):
         inverse = list(np.argsort(order))
         slots = [config.slot[k] for k in inverse]  # of physical transmitters, if chirps stayed where they are
-        fired = tuple(config.tx[k] for k in np.argsort(slots))
-        tx = ",".join(str(t + 1) for t in fired)
-        change = Mending(config.model_copy(update={"tx_order": fired}), _taken(2, inverse))
+        firings = tuple(config.tx[k] for k in np.argsort(slots))
+        tx = ",".join("+".join(str(t + 1) for t in fired(firing)) for firing in firings)
+        change = Mending(config.model_copy(update={"tx_order": firings}), _taken(2, inverse))
         held = ", ".join(f"{names[order[k]]} in place of {names[k]}" for k in range(len(order)) if order[k] != k)
         yield Candidate(
             "transmitter order",
@@ -78,7 +80,7 @@ def candidates(config: RadarConfig) -> Iterator[Candidate]:
             "transmitter order", held, "reorder the transmitters' axis", Reading.of(config, tx=order, moved=True),
             Mending(samples=_taken(2, inverse)),
         )  # fmt: skip
-    for order in [each for each in permutations(range(len(config.rx))) if list(each) != sorted(each)]:
+    for order in _orders(len(config.rx)):
         held = ", ".join(
             f"RX{config.rx[order[k]] + 1} in place of RX{config.rx[k] + 1}" for k in range(len(order)) if order[k] != k
         )
@@ -96,13 +98,22 @@ def candidates(config: RadarConfig) -> Iterator[Candidate]:
         yield Candidate("board", words, f"import it with --board {name}", Reading.of(other), Mending(other))
 
 
+def _orders(count: int) -> list[tuple[int, ...]]:
+    """Orders in which antennas may stand instead: all of a few; of more, two exchanged, or all reversed."""
+    ordered = tuple(range(count))
+    if count <= _ALL:
+        return [each for each in permutations(ordered) if each != ordered]
+    exchanged = [tuple({i: j, j: i}.get(k, k) for k in ordered) for i, j in combinations(ordered, 2)]
+    return [*exchanged, ordered[::-1]]
+
+
 def _taken(axis: int, order: list[int]) -> Callable[[np.ndarray], np.ndarray]:
     return lambda frames: np.ascontiguousarray(np.take(frames, order, axis=axis))
 
 
 def _alike(config: RadarConfig, name: str) -> bool:
     one, other = load_board(config.board), load_board(name)
-    return (one.tx, one.rx, one.rx_sign) == (other.tx, other.rx, other.rx_sign)
+    return (one.tx, one.rx, one.tx_sign, one.rx_sign) == (other.tx, other.rx, other.tx_sign, other.rx_sign)
 
 
 def plane_waves(evidence: Evidence) -> PlaneWaves:

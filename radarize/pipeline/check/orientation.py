@@ -75,8 +75,7 @@ def elevation_mirrored(evidence: Evidence) -> Iterator[Finding]:
     """The radar bobs down where true poses go up."""
     if evidence.truth is None:
         raise NotObservable("no true poses know up from down; floors and ceilings look alike")
-    velocity, _ = true_motion(evidence, evidence.motions.time)
-    pairs = _pairs(evidence.motions.velocity[:, 2], velocity[:, 2], _BOBS)
+    pairs = _along(evidence, 2, _BOBS)
     opposite = _opposite(pairs, "the radar hardly moves up and down")
     if opposite > _SURE:
         yield Finding(
@@ -90,8 +89,7 @@ def backwards(evidence: Evidence) -> Iterator[Finding]:
     """The radar moves backward where true poses move forward."""
     if evidence.truth is None:
         raise NotObservable("no true poses know the direction of travel")
-    velocity, _ = true_motion(evidence, evidence.motions.time)
-    pairs = _pairs(evidence.motions.velocity[:, 0], velocity[:, 0], _FAST)
+    pairs = _along(evidence, 0, _FAST)
     opposite = _opposite(pairs, "the radar hardly moves forward or backward")
     if opposite > _SURE:
         yield Finding(
@@ -118,6 +116,12 @@ def true_motion(evidence: Evidence, time: np.ndarray) -> tuple[np.ndarray, np.nd
     far = np.abs(truth.time[middle] - time) > 0.2
     velocity[far], turn[far] = np.nan, np.nan
     return velocity, turn
+
+
+def _along(evidence: Evidence, axis: int, least: float) -> list[bool]:
+    """`_pairs` of the radar's velocity along an axis and the truth's."""
+    motions = evidence.motions
+    return _pairs(motions.velocity[:, axis], true_motion(evidence, motions.time)[0][:, axis], least)
 
 
 def _pairs(one: np.ndarray, other: np.ndarray, least: float) -> list[bool]:

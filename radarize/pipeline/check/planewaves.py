@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Complex, Complex64, Float
 
+from radarize.radar.array import layout
 from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 from radarize.signal.snapshots import Snapshots
@@ -43,13 +44,12 @@ class Reading:
             rx: the same of receivers.
             moved: the chirps' times were exchanged with the transmitters; else the order of firing is another one.
         """
-        board = load_board(config.board)
+        out, back = layout(config)
         tx, rx = tx or tuple(range(len(config.tx))), rx or tuple(range(len(config.rx)))
-        out = np.asarray(board.tx, float)[[config.tx[k] for k in tx]]
-        back = np.asarray(board.rx, float)[[config.rx[k] for k in rx]]
+        out, back = out[list(tx)], back[list(rx)]
         factors = config.calibration[np.ix_(tx, rx)]
         slots = np.asarray(config.slot)[list(tx)] if moved else np.asarray(config.slot)
-        spacing = config.center_frequency / board.design_frequency
+        spacing = config.center_frequency / load_board(config.board).design_frequency
         return cls(
             out[:, None] + back[None], factors / np.abs(factors), slots * config.chirp_time, config.wavelength, spacing
         )

@@ -152,8 +152,8 @@ def receivers(*order: int) -> Harm:
 
 
 def other_board(walk: Walk, rng: np.random.Generator) -> Walk | None:
-    """Another one of the 60 GHz boards is configured."""
-    sixty = [name for name, board in BOARDS.items() if board.design_frequency < 70e9]
+    """Another one of the boards with an IWR6843 is configured."""
+    sixty = [name for name, board in BOARDS.items() if board.chip == "iwr6843"]
     if str(walk.config.board) not in sixty:
         return None
     name = sixty[(sixty.index(str(walk.config.board)) + 1) % len(sixty)]

@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import cast
 
 from radarize.io.errors import InputError
 from radarize.io.hdf5 import open_hdf5
@@ -69,9 +70,9 @@ def import_archive(folder: Path, output: Path, progress: Callable[[int, int], No
 
 
 def _import(bag: Path, output: Path) -> None:
-    platform, building = _NAME.fullmatch(bag.stem).groups()
     if output.exists():
         return
+    platform, building = bag.stem.split("_")[:2]
     part = output.with_suffix(".part.h5")
     with suppress(FileNotFoundError):
         part.unlink()
@@ -91,8 +92,8 @@ def splits(names: list[str]) -> dict[str, Members]:
     Args:
         names: of the recordings; those that the artefact does not list are in no random split.
     """
-    listed = read_yaml(Path(__file__).with_name("archive.yaml"))
-    words = {name: _NAME.fullmatch(name).groups() for name in names}
+    listed = cast(dict[str, str], read_yaml(Path(__file__).with_name("archive.yaml")))
+    words = {name: name.split("_") for name in names}
     found = {
         f"random-{k}": {part: [n for n in names if listed.get(n, "-----")[k] == code] for code, part in _PARTS.items()}
         for k in range(5)

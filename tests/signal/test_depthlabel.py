@@ -1,4 +1,4 @@
-"""The occupancy label of depth pictures against rays cast by hand."""
+"""The occupancy label of depth pictures against closed forms."""
 
 import numpy as np
 import pytest

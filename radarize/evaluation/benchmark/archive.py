@@ -23,7 +23,7 @@ PLATFORMS = {"walk": "handheld", "cart": "cart", "bot": "robot"}
 BUILDINGS = {"sc": "A", "csl": "B", "ece": "C", "beckman": "D"}
 _NAME = re.compile(rf"({'|'.join(PLATFORMS)})_({'|'.join(BUILDINGS)})_.+")
 _PARTS = {"t": "train", "v": "validation", "e": "test"}
-#: Of the splits by platform and by building, whose lists are not published, every so many-th recording of the training
+#: Of the splits by platform and by building, whose lists are not published, every tenth recording of the training
 #: part validates.
 _EVERY = 10
 Members = dict[str, list[str]]

@@ -51,13 +51,13 @@ def _with_the_archives_radar(room):
 
 
 def test_bags_become_recordings_with_platform_and_building(archive, tmp_path):
-    said = []
-    import_archive(archive, tmp_path, lambda done, total: said.append((done, total)))
+    reported = []
+    import_archive(archive, tmp_path, lambda done, total: reported.append((done, total)))
     found = {case.name: (case.building, case.platform) for case in DataSet.load(tmp_path).cases}
     assert found == {
         "bot_ece_basement_1": ("C", "robot"), "cart_sc_0": ("A", "cart"), "walk_csl_upper_9": ("B", "handheld")
     }  # fmt: skip
-    assert said[-1] == (3, 3)
+    assert reported[-1] == (3, 3)
     before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
     import_archive(archive, tmp_path, lambda done, total: None)
     assert before == {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}

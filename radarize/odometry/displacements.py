@@ -16,7 +16,7 @@ from radarize.odometry.uncertainty import ErrorModel
 _WANDER, _FASTEST = 0.37, 1.0
 
 
-class Displacements:
+class DisplacementIntegrator:
     """Positions of the last frames, and the track that the newest ones make.
 
     Args:
@@ -40,13 +40,13 @@ class Displacements:
     def time(self) -> float | None:
         return float(self._times[-1]) if len(self._times) else None
 
-    def arrive(self, time: float) -> int:
+    def add_frame(self, time: float) -> int:
         """The next frame; how many frames ago displacements until it began, 0 if that frame was lost."""
         self._times = np.append(self._times[-self.reach :], time)
         rows, there = spaced(self._times, 1, 2, self._apart, self._period)
         return int(rows[0, 1] - rows[0, 0]) if there.all() else 0
 
-    def next(
+    def update(
         self, dt: float, back: int, displacement: np.ndarray, covariance: np.ndarray, yaw: float, doubt: float
     ) -> tuple[np.ndarray, ...]:
         """Pose, step, its covariance, velocity, its covariance, and whether a displacement told of it, of the frame
@@ -65,7 +65,7 @@ class Displacements:
         place = np.array([*(each.values[-1] for each in self._axes), yaw])
         self._first = place if self._first is None else self._first
         before, self._pose = self._pose, between(self._first, place)
-        spread = np.diag([*(each.since(1) for each in self._axes), 0.0])
+        spread = np.diag([*(each.variance_since(1) for each in self._axes), 0.0])
         cos, sin = np.cos(yaw), np.sin(yaw)
         turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
         spread = turned @ spread @ turned.T + np.diag([1e-8, 1e-8, min(doubt, np.pi**2)])
@@ -74,8 +74,8 @@ class Displacements:
         return self._pose, between(before, self._pose), spread, rate, known, back > 0
 
 
-def joined(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bool = False) -> Track:
-    """What `Displacements.next` said of every frame; turns are seen with displacements, or always."""
+def as_track(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bool = False) -> Track:
+    """What `DisplacementIntegrator.next` said of every frame; turns are seen with displacements, or always."""
     *values, seen = (np.stack(each) for each in zip(*track, strict=True))
     pose, step, spread, *velocity = values
     return Track(times, pose, step, *velocity, seen, seen | turn_seen, ErrorModel.independent(spread))

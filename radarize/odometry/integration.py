@@ -24,7 +24,7 @@ _BRIDGED, _SMOOTH = 0.32, 1.0
 _STEADY = 0.1
 #: s, time constant of the correlation of errors of velocities, those in a row being of the same echoes (chosen on 12
 #: walks of 60 s: handheld, cart and robot in A to D of seeds 301 to 304).
-LASTING = 1.0
+CORRELATION_TIME = 1.0
 
 
 class VelocityEstimator(Protocol):
@@ -178,7 +178,7 @@ class Odometry:
 def _correlation(dt: float, before: Float[np.ndarray, "2 2"], now: Float[np.ndarray, "2 2"]) -> float:
     """Share of a velocity's error that goes on for `dt` s: no more than leaves the covariance that it has now."""
     least = np.linalg.eigvals(np.linalg.solve(before, now)).real.min()
-    return float(np.exp(-dt / LASTING) * np.sqrt(np.clip(least, 0.0, 1.0)))
+    return float(np.exp(-dt / CORRELATION_TIME) * np.sqrt(np.clip(least, 0.0, 1.0)))
 
 
 def intervals(times: Float[np.ndarray, "frame"], last: float | None) -> Float[np.ndarray, "frame"]:

@@ -93,7 +93,7 @@ class LearnedRotation:
             if dt > self._longest:
                 # What comes after a gap does say how fast the sensor may have turned within; but that would be told as
                 # a turn of a later frame.
-                self._yaws.part()
+                self._yaws.decouple()
             for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
                 self._yaws.add_relative_motion(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last

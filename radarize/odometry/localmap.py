@@ -60,7 +60,7 @@ class LocalMap:
         """A frame joins the map: where it had been seen often, the frame's share of the cell's mean is `share`."""
         _blend(view, self._grid, position, yaw, share)
 
-    def follow(self, position: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+    def recenter(self, position: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Keep the sensor in the map's middle; its position after that. What leaves the map is forgotten."""
         cell = self._grid.cell
         steps = np.rint(position / cell).astype(int)

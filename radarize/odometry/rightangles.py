@@ -11,12 +11,12 @@ from radarize.io.pose import wrap
 _NEW, _CERTAIN = 0.5, 0.9
 
 
-def past_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[np.ndarray, "*any"]:
+def from_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[np.ndarray, "*any"]:
     """Angles (rad) less the nearest multiple of a right one: within pi/4 of 0."""
     return wrap(4 * angle) / 4
 
 
-def recognised(
+def associate_direction(
     off: Float[np.ndarray, "direction"],
     variances: float | Float[np.ndarray, "direction"],
     walls: Sequence[int],

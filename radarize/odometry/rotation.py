@@ -28,35 +28,35 @@ from torch.nn.functional import avg_pool1d
 
 from radarize.io.plain import Frozen, setting
 from radarize.io.pose import compose
-from radarize.odometry.bearings import YAW, Bearings
+from radarize.odometry.bearings import YAW, BearingTracker
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
-from radarize.odometry.smoother import Gaussian, wandered
+from radarize.odometry.smoother import Gaussian, random_walk_covariance
 from radarize.signal.batch import Batch
 from radarize.signal.heatmaps import Heatmaps
 
 #: Range and Doppler bins at most: what a frame takes is bounded for every chirp that the chip can send.
-_RANGES, _SPEEDS = 256, 64
+_MAX_RANGES, _MAX_DOPPLER_BINS = 256, 64
 #: Half widths of the high-pass over range bins and azimuth columns.
 _TEXTURE = (12, 12)
 #: Of the predicted yaw's standard deviations, how many are searched to either side.
 _SIGMAS = 3.0
 #: Cells of a frame that speak independently of the others. Of those that the map knows, a correlation c is so much
 #: likelier for a match than by chance: (1 - c^2)^(-cells / 2).
-_INDEPENDENT = 50
+_INDEPENDENT_CELLS = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
-_ASTRAY = np.radians(45.0)
+_MAX_MAP_YAW_STD = np.radians(45.0)
 #: rad^0.5: what a heading is off by that nothing takes back, for what it has turned: 0.6 degrees a quarter turn. A
 #: sensor that stands or goes straight hardly drifts (chosen on the walks of `benchmark.choices.CLAIMS`).
 _DRIFT = 0.0086
 #: m to either side of a wall's flash, where it hides the rest.
-_RING = 0.1
+_SPECULAR_WIDTH = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
 LAG = 0.2
 #: `Rotations` of the first frame of all.
-_FIRST = (0.0, 0.0, True, 1.0, 0.0)
+_FIRST_FRAME = (0.0, 0.0, True, 1.0, 0.0)
 #: Places in the filter of the turning rate, and of the angle at which the map lies.
 _RATE, _MAP = 1, 2
 
@@ -157,14 +157,19 @@ class MapRotation:
         self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
         self._bearing_sines = s.stretch * self._sines  # sines of where the cells lie
-        self._ranges = heatmaps.ranges[:_RANGES][self._first :]
+        self._ranges = heatmaps.ranges[:_MAX_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
         self._state = Gaussian(np.array([0.0, s.fastest**2, 0.0]))
-        self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state, s.right_angles)
+        self._echoes, self._bearings = (
+            Echoes(heatmaps, self._first),
+            BearingTracker(heatmaps, self._state, s.right_angles),
+        )
         self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
-        self._start = self._way = np.zeros(3)  # pose before the last step, on its mean heading, and the step
+        self._step_start = self._step_motion = np.zeros(
+            3
+        )  # pose before the last step, on its mean heading, and the step
         self._prior = prior
 
     def features(
@@ -172,7 +177,7 @@ class MapRotation:
     ) -> Float32[np.ndarray, "frame r a"]:
         """Contrast of the Capon map, dB over the surroundings."""
         s = self.settings
-        limited = self._heatmaps.limited(_essence(spectrum[:, :_RANGES]), s.limit)
+        limited = self._heatmaps.limited(_reduce_doppler(spectrum[:, :_MAX_RANGES]), s.limit)
         capon = self._heatmaps.range_azimuth_of(limited, "capon")[:, self._first :]
         floor = capon.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
         level = 10 * torch.log10((capon / floor).clamp_min(1))
@@ -184,11 +189,11 @@ class MapRotation:
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> list[list[Echo]]:
         """The strongest of each frame."""
-        return [self._echoes.of(cells) for cells in spectrum[:, :_RANGES].numpy()]
+        return [self._echoes.of(cells) for cells in spectrum[:, :_MAX_RANGES].numpy()]
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames, given their velocities."""
-        told = None if self._prior is None else self._doubted(self._prior.estimate(batch, velocities))
+        prior = None if self._prior is None else self._inflated(self._prior.estimate(batch, velocities))
         turns = []
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
         for i, (feature, echoes) in enumerate(shown):
@@ -196,38 +201,41 @@ class MapRotation:
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
             if self._time is None:
-                turns.append(_FIRST)
+                turns.append(_FIRST_FRAME)
             else:
-                turn = None if told is None else (told.yaw[i], told.noise[i])
-                turns.append(self._turn(view, time, dt, velocity, turn, echoes))
-            self._join(view, -np.expm1(-dt / self.settings.memory))
+                turn = None if prior is None else (prior.yaw[i], prior.noise[i])
+                turns.append(self._step(view, time, dt, velocity, turn, echoes))
+            self._blend(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
-        yaw, noise, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
+        yaw, noise, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST_FRAME)).T
         return Rotations(yaw, noise, seen.astype(bool), *lasting)
 
-    def _doubted(self, told: Rotations) -> Rotations:
+    def _inflated(self, prior: Rotations) -> Rotations:
         """What a network says; where frames are missing none has spoken, but what is known of how turning rates
         wander."""
-        return replace(told, noise=np.where(told.seen, self.settings.doubt, 1.0) * told.noise)
+        return replace(prior, noise=np.where(prior.seen, self.settings.doubt, 1.0) * prior.noise)
 
-    def _turn(
+    def _step(
         self,
         view: View,
         time: float,
         dt: float,
         velocity: Float[np.ndarray, "2"],
-        told: tuple[float, float] | None,
+        prior: tuple[float, float] | None,
         echoes: list[Echo],
     ) -> tuple[float, float, bool, float, float]:
         """`Rotations` of a frame `dt` s after the last one."""
         state, mean = self._state, (self._velocity + velocity) / 2
-        start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
+        start, laid, known = state.mean[YAW], self._map_yaw, state.covariance[YAW, YAW]
         state.remember(YAW)
-        self._predict(dt, told)
-        self._bearings.move(dt, mean)
-        seen = self._bearings.see(time, echoes, velocity)
-        self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
-        self._position = self._seen_from(0.0)
+        self._predict(dt, prior)
+        self._bearings.predict(dt, mean)
+        seen = self._bearings.update(time, echoes, velocity)
+        self._step_start, self._step_motion = (
+            np.array([*self._position, (laid + self._map_yaw) / 2]),
+            np.array([*(dt * mean), 0.0]),
+        )
+        self._position = self._position_at(0.0)
         seen = self._match(view) or seen
         variance, turned = state.covariance[YAW, YAW], state.mean[YAW] - start
         drift = _DRIFT**2 * abs(turned) if seen else self.settings.unseen**2 * dt
@@ -236,38 +244,38 @@ class MapRotation:
         return turned, drift, seen, correlation, variance
 
     @property
-    def _laid(self) -> float:
+    def _map_yaw(self) -> float:
         """Yaw in the map."""
         return float(self._state.mean[YAW] - self._state.mean[_MAP])
 
-    def _predict(self, dt: float, told: tuple[float, float] | None) -> None:
+    def _predict(self, dt: float, prior: tuple[float, float] | None) -> None:
         """Yaw and rate `dt` s later: by the rate, or by what another estimator says of the turn and its variance."""
         state, known = self._state, self._state.covariance[YAW, YAW]
-        if told is None:
+        if prior is None:
             state.replace(YAW, state.row({YAW: 1.0, _RATE: dt}))
-            state.covariance[: _RATE + 1, : _RATE + 1] += wandered(self.settings.wander, dt)
+            state.covariance[: _RATE + 1, : _RATE + 1] += random_walk_covariance(self.settings.wander, dt)
         else:
-            state.mean[YAW] += told[0]
-            state.covariance[YAW, YAW] += told[1]
+            state.mean[YAW] += prior[0]
+            state.covariance[YAW, YAW] += prior[1]
         if state.covariance[YAW, YAW] - known > np.pi**2:  # any heading; larger numbers would only cost digits
             state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
             state.covariance[YAW, YAW] = known + np.pi**2
 
-    def _join(self, view: View, share: float) -> None:
+    def _blend(self, view: View, share: float) -> None:
         """A frame joins the map, which then lies as far wrong as its frames do on average."""
-        self._position = self._map.follow(self._position)
-        self._map.blend(view, self._position, self._laid, share)
+        self._position = self._map.recenter(self._position)
+        self._map.blend(view, self._position, self._map_yaw, share)
         lies = self._state.mean[_MAP]
         self._state.replace(_MAP, self._state.row({YAW: share, _MAP: 1 - share}))
         self._state.mean[_MAP] = lies  # where the frame was laid is no news
 
     def _match(self, view: View) -> bool:
         """Correct the filter by how the frame lies in the map, and say whether that is known."""
-        for flash in self._bearings.flashes:  # no landmarks: they slide along walls as the sensor does
-            view.feature[np.abs(self._ranges - flash) < _RING] = 0.0
+        for flash in self._bearings.specular_ranges:  # no landmarks: they slide along walls as the sensor does
+            view.feature[np.abs(self._ranges - flash) < _SPECULAR_WIDTH] = 0.0
         row = self._state.row({YAW: 1.0, _MAP: -1.0})
         spread = np.sqrt(max(self._state.variance(row), 0.0))
-        if spread > _ASTRAY:
+        if spread > _MAX_MAP_YAW_STD:
             self._map.forget()
             self._state.replace(_MAP, self._state.row({YAW: 1.0}))
             self._state.replace(_RATE, self._state.row({}))
@@ -276,15 +284,15 @@ class MapRotation:
         offset, correlation = self._fit(view, spread)
         if correlation < self.settings.least_correlation:
             return False
-        laid = self._laid
+        laid = self._map_yaw
         self._state.update(row, offset, (self._noise / correlation) ** 2)
-        self._position = self._seen_from(self._laid - laid)
+        self._position = self._position_at(self._map_yaw - laid)
         return True
 
-    def _seen_from(self, offset: float | Float[np.ndarray, "offset"]) -> Float[np.ndarray, "*offset 2"]:
+    def _position_at(self, offset: float | Float[np.ndarray, "offset"]) -> Float[np.ndarray, "*offset 2"]:
         """Position in the map if the yaw is off by so much: the way there was taken along the mean of the headings at
         both ends."""
-        return compose(self._start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._way)[..., :2]
+        return compose(self._step_start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._step_motion)[..., :2]
 
     def _fit(self, view: View, spread: float) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
@@ -293,11 +301,11 @@ class MapRotation:
         fan = np.clip(_SIGMAS * spread, s.fan, s.widest)
 
         def correlate(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self._map.correlate(view, self._seen_from(offsets), self._laid + offsets)
+            return self._map.correlate(view, self._position_at(offsets), self._map_yaw + offsets)
 
         coarse = 3 * s.step * np.arange(-np.ceil(fan / (3 * s.step)), np.ceil(fan / (3 * s.step)) + 1)
         correlation, overlap = correlate(coarse)
-        odds = -_INDEPENDENT * overlap / 2 * np.log1p(-(np.clip(correlation, 0, 0.999) ** 2))
+        odds = -_INDEPENDENT_CELLS * overlap / 2 * np.log1p(-(np.clip(correlation, 0, 0.999) ** 2))
         fine = coarse[np.argmax(odds - (coarse * _SIGMAS / fan) ** 2 / 2)] + s.step * np.arange(-4, 5)
         correlation, _ = correlate(fine)
         best = int(np.argmax(correlation))
@@ -307,9 +315,9 @@ class MapRotation:
         return float(fine[best] + s.step * np.clip(vertex(left, peak, right), -1, 1)), float(peak)
 
 
-def _essence(spectrum: torch.Tensor) -> torch.Tensor:
+def _reduce_doppler(spectrum: torch.Tensor) -> torch.Tensor:
     """Of so many neighbouring Doppler bins that few enough are left, the strongest at each range."""
-    together = -(-spectrum.shape[2] // _SPEEDS)
+    together = -(-spectrum.shape[2] // _MAX_DOPPLER_BINS)
     if together == 1:
         return spectrum
     count = spectrum.shape[2] // together

@@ -110,9 +110,9 @@ class FixedLagSmoother(Gaussian):
         move[size - 1 :, size - 1 :] = [[1.0, duration], [0.0, 1.0]]
         self.mean = move @ self.mean
         self.covariance = move @ self.covariance @ move.T
-        self.covariance[-2:, -2:] += wandered(self._wander, duration)
+        self.covariance[-2:, -2:] += random_walk_covariance(self._wander, duration)
 
-    def part(self) -> None:
+    def decouple(self) -> None:
         """What follows tells no more of what was, nor of how the value came to be what it is."""
         self.covariance = np.diag(np.diag(self.covariance) * (np.arange(len(self.mean)) >= len(self.mean) - 2))
 
@@ -122,7 +122,7 @@ class FixedLagSmoother(Gaussian):
             row = self._difference(back)
             self.update(row, difference - float(row @ self.mean), variance, far=np.inf)
 
-    def since(self, back: int) -> float:
+    def variance_since(self, back: int) -> float:
         """Variance of the difference from `back` frames ago to now."""
         return self.variance(self._difference(back))
 
@@ -130,7 +130,7 @@ class FixedLagSmoother(Gaussian):
         return self.row({-2: 1.0, -2 - back: -1.0})
 
 
-def wandered(wander: float, duration: float) -> Float[np.ndarray, "2 2"]:
+def random_walk_covariance(wander: float, duration: float) -> Float[np.ndarray, "2 2"]:
     """Covariance of what a value and its rate have changed by, if the rate is a random walk of `wander` per root second
     (Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 6.2.2).
     """

@@ -32,7 +32,7 @@ def strongest(
     return _peak(occupied, power, occupied.any(axis=1))
 
 
-def at(
+def bins_to_ranges(
     bins: Float[np.ndarray, "frame azimuth"], ranges: Float[np.ndarray, "range"]
 ) -> Float[np.ndarray, "frame azimuth"]:
     """Ranges (m) of fractional bins, inf where there is none, by those of whole bins, evenly spaced."""

@@ -73,7 +73,7 @@ class Maps:
 
     def scans(self, method: str) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `BEARINGS`, m, inf where nothing is seen, by a key of `METHODS`."""
-        return echoes.at(METHODS[method](self), self.ranges)
+        return echoes.bins_to_ranges(METHODS[method](self), self.ranges)
 
 
 def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[np.ndarray, "frame range bearing"]:

@@ -14,13 +14,13 @@ from radarize.scans import echoes
 from radarize.scans.extraction import HeatmapScans
 from radarize.signal.batch import Batch
 
-#: Least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer bearings.
-LEAST = 0.7
+#: Least probability that a range is right within `HALF_WIDTH` cells: higher leaves fewer ghosts and fewer bearings.
+MIN_PROBABILITY = 0.7
 #: Cells to either side that count as right: 9 cm of the preset's.
-NEAR = 2
+HALF_WIDTH = 2
 #: Of its width, how far a column's outermost rays lie from its middle, in the label that the network learned
 #: (`radarsim.sensors.scan`).
-OUTERMOST = 3 / 8
+EDGE_OFFSET = 3 / 8
 #: m: what differs by less from bearing to bearing is one surface.
 _STEP = 0.3
 
@@ -61,9 +61,9 @@ class SegmentationScans:
         with stage("scans"):
             occupancy = self.occupancy(batch)
             if self.first:
-                near = at_middles(echoes.at(first_surface(occupancy, LEAST), self.ranges))
+                near = at_column_centers(echoes.bins_to_ranges(first_surface(occupancy, MIN_PROBABILITY), self.ranges))
             else:
-                near = echoes.at(echoes.strongest(occupancy >= LEAST, occupancy), self.ranges)
+                near = echoes.bins_to_ranges(echoes.strongest(occupancy >= MIN_PROBABILITY, occupancy), self.ranges)
         if self._beyond is None:
             return near
         far = self._beyond.extract(batch)
@@ -74,15 +74,15 @@ def first_surface(
     occupancy: Float[np.ndarray, "frame range bearing"], least: float
 ) -> Float[np.ndarray, "frame bearing"]:
     """Fractional range bin of every bearing's first surface, inf where none is likely enough."""
-    bins, probability = likeliest(occupancy)
+    bins, probability = most_likely(occupancy)
     return np.where(probability >= least, bins, np.inf)
 
 
-def at_middles(ranges: Float[np.ndarray, "frame bearing"]) -> Float[np.ndarray, "frame bearing"]:
+def at_column_centers(ranges: Float[np.ndarray, "frame bearing"]) -> Float[np.ndarray, "frame bearing"]:
     """Ranges in the middle of each column, from those of its nearest ray, inf where there is none.
 
     The network was taught all surfaces that a column's rays see, and the first of a wall at an angle is that of an
-    outermost ray: by `OUTERMOST` of what the range changes from column to column too near.
+    outermost ray: by `EDGE_OFFSET` of what the range changes from column to column too near.
     """
     steps = np.diff(np.where(np.isinf(ranges), np.nan, ranges), axis=1)
     same = np.abs(steps) <= _STEP
@@ -90,28 +90,28 @@ def at_middles(ranges: Float[np.ndarray, "frame bearing"]) -> Float[np.ndarray, 
     for side in (np.s_[:, 1:], np.s_[:, :-1]):
         change[side] += np.where(same, steps, 0)
         sides[side] += same
-    return ranges + OUTERMOST * np.abs(change) / np.maximum(sides, 1)
+    return ranges + EDGE_OFFSET * np.abs(change) / np.maximum(sides, 1)
 
 
-def likeliest(
+def most_likely(
     occupancy: Float[np.ndarray, "frame range bearing"],
 ) -> tuple[Float[np.ndarray, "frame bearing"], Float[np.ndarray, "frame bearing"]]:
     """Fractional range bin where every bearing's first surface is likeliest, and how likely it is that near.
 
     With h the probability of a cell if nothing is before it, the first surface is in a cell with probability
     h * product over nearer cells of (1 - h): behind a surface hardly anything is left for ghosts, which is the
-    first-echo rule in terms of probability. The answer is the mean over the likeliest 2 `NEAR` + 1 cells in a row.
+    first-echo rule in terms of probability. The answer is the mean over the likeliest 2 `HALF_WIDTH` + 1 cells in a row.
     """
     free = np.cumprod(1 - occupancy, axis=1)
     here = occupancy * np.concatenate([np.ones_like(free[:, :1]), free[:, :-1]], axis=1)
     place = here * np.arange(here.shape[1])[:, None]
-    mass, moment = (_stretches(values) for values in (here, place))
+    mass, moment = (_window_sums(values) for values in (here, place))
     best = mass.argmax(axis=1)[:, None]
     mass, moment = (np.take_along_axis(values, best, axis=1)[:, 0] for values in (mass, moment))
     return moment / np.maximum(mass, 1e-12), mass
 
 
-def _stretches(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:
-    """Sums over each cell and its `NEAR` neighbours to either side."""
-    total = np.cumsum(np.pad(values, ((0, 0), (NEAR + 1, NEAR), (0, 0))), axis=1)
-    return total[:, 2 * NEAR + 1 :] - total[:, : -2 * NEAR - 1]
+def _window_sums(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:
+    """Sums over each cell and its `HALF_WIDTH` neighbours to either side."""
+    total = np.cumsum(np.pad(values, ((0, 0), (HALF_WIDTH + 1, HALF_WIDTH), (0, 0))), axis=1)
+    return total[:, 2 * HALF_WIDTH + 1 :] - total[:, : -2 * HALF_WIDTH - 1]

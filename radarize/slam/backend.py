@@ -15,16 +15,16 @@ from radarize.io.pose import Pose, between, carried, compose, interpolate, trans
 from radarize.odometry.uncertainty import ErrorModel
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
-from radarize.slam.drawing import Drawing
 from radarize.slam.grid import OccupancyGrid
-from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
+from radarize.slam.loops import LoopCandidate, LoopSearch, LoopVerifier, match_covariance
 from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
-from radarize.slam.odometry import FARTHEST, Drift, Odometry, Stillness
+from radarize.slam.odometry import FARTHEST, ConstantMotion, Drift, Odometry
 from radarize.slam.posegraph import PoseGraph
+from radarize.slam.rendering import MapRenderer
 from radarize.slam.rows import Rows
 from radarize.slam.submap import Submap
-from radarize.slam.trimming import needless
+from radarize.slam.trimming import redundant_submaps
 from radarize.slam.walls import Walls
 
 #: Nodes whose last loop searches may wait at a time.
@@ -78,7 +78,7 @@ class Slam:
         self._local: list[np.ndarray] = []  # of every node in the local frame
         self._drift = Drift(self.config.odometry.scale)
         self._search = LoopSearch(self.config.loop)
-        self._jury = Jury(self.graph, self._drift, self.config.loop)
+        self._verifier = LoopVerifier(self.graph, self._drift, self.config.loop)
         self._walls = Walls(self.config.walls)
         self._building: list[Submap] = []
         self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
@@ -139,7 +139,7 @@ class Slam:
     def finish(self) -> None:
         """Process what still waits, search all loops once more from the optimised poses, and optimise."""
         if not len(self.odometry):
-            self.odometry = Stillness(self.config.odometry)
+            self.odometry = ConstantMotion(self.config.odometry)
         self._drain(final=True)
         if self._open:
             self._add_node()
@@ -147,7 +147,7 @@ class Slam:
             if 2 * len(submap.nodes) >= self.config.grid.nodes:
                 self._align(submap)
         if self.config.loop.enabled:
-            self._hear()
+            self._collect_closures()
             self.graph.optimise()
             self._close_again()
         self.graph.optimise()
@@ -196,7 +196,7 @@ class Slam:
 
     def map(self) -> OccupancyGrid:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
-        return Drawing(self.config.grid).of(self.nodes, self.graph.poses)
+        return MapRenderer(self.config.grid).render(self.nodes, self.graph.poses)
 
     # --- the algorithm, step by step ---------------------------------------------------------------------------------
     def _drain(self, final: bool = False) -> None:
@@ -224,7 +224,7 @@ class Slam:
         """Whether a scan is from elsewhere, by a share of what makes a node; without odometry nobody knows."""
         x, y, yaw = between(place, scan.odometry)
         c = self.config.node
-        unknown = isinstance(self.odometry, Stillness)
+        unknown = isinstance(self.odometry, ConstantMotion)
         return unknown or np.hypot(x, y) >= share * c.distance or abs(yaw) >= share * c.angle
 
     def _add_node(self) -> None:
@@ -243,7 +243,7 @@ class Slam:
             self.graph.add_motion(len(self.nodes) - 1, len(self.nodes), motion, covariance)
             self._local.append(local)
             self._drift.add(local, covariance, float(np.hypot(motion[0], motion[1])))
-            if isinstance(self.odometry, Stillness):
+            if isinstance(self.odometry, ConstantMotion):
                 self.odometry.last = moved
         self.nodes.append(node)
         self.odometry.release(node.time, node.time)
@@ -274,7 +274,7 @@ class Slam:
         result = match(
             submap.grid, points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
-        noise = uncertainty(result, c.translation_floor, c.rotation_floor)
+        noise = match_covariance(result, c.translation_floor, c.rotation_floor)
         self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
         return compose(self._local[submap.anchor], result.pose)
 
@@ -302,7 +302,7 @@ class Slam:
         points = _seen(middle, self._local, {k: self.nodes[k].points for k in submap.nodes})
         if len(points) < self.config.node.min_points:
             return
-        told = self._walls.meet(middle, points, poses[:, 2], lambda *nodes: self._drift.between(*nodes)[2, 2])
+        told = self._walls.associate(middle, points, poses[:, 2], lambda *nodes: self._drift.between(*nodes)[2, 2])
         if told is not None:
             other, turn = told
             x, y, _ = between(poses[other], poses[middle])
@@ -312,17 +312,17 @@ class Slam:
 
     def _trim(self) -> None:
         """Forget submaps of places that were shown often enough since, and the nodes that are in no other one."""
-        gone = needless(self.submaps, self.graph.poses)
+        gone = redundant_submaps(self.submaps, self.graph.poses)
         if len(gone) < _TRIM:
             return
-        self._hear()
+        self._collect_closures()
         stay = [k for k, submap in enumerate(self.submaps) if submap not in gone]
         self._centers = [self._centers[k] for k in stay if k < len(self._centers)]
         self.submaps = [self.submaps[k] for k in stay]
         kept = sorted({number for submap in self.submaps for number in submap.nodes})
         self.graph.keep(kept, self._drift.between)
         self._drift.keep(kept)
-        self._jury.forget()
+        self._verifier.forget()
         self.nodes, self._local = [self.nodes[k] for k in kept], [self._local[k] for k in kept]
         place = {number: k for k, number in enumerate(kept)}
         self._walls.keep(place)
@@ -333,8 +333,8 @@ class Slam:
         """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""
         c = self.config.loop
         if number % c.every == 0:
-            self._search.ask(self._questions(number, c.candidates, c.min_score, self._drift.between))
-        if self._hear(number - c.lag) or number % c.update_every == 0:
+            self._search.submit(self._loop_candidates(number, c.candidates, c.min_score, self._drift.between))
+        if self._collect_closures(number - c.lag) or number % c.update_every == 0:
             self.graph.update()
 
     def _close_again(self) -> None:
@@ -353,18 +353,18 @@ class Slam:
 
         numbers = range(len(self.nodes))
         for number in sorted({*numbers[:: max(c.nodes // 2, 1)], *numbers[-1:]}):  # a walk may close with its last node
-            questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
-            self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
-            self._hear(number - _AHEAD)  # what waits takes memory
-        self._hear()
+            candidates = self._loop_candidates(number, 2 * c.candidates, c.final_score, spread)
+            self._search.submit([q for q in candidates if (q.submap.anchor, number) not in done])
+            self._collect_closures(number - _AHEAD)  # what waits takes memory
+        self._collect_closures()
 
-    def _hear(self, before: int | None = None) -> bool:
+    def _collect_closures(self, before: int | None = None) -> bool:
         """Take in what was found for nodes up to `before`, or for all; True if poses should move for it now."""
-        return any([self._jury.hear(closure) for closure in self._search.answers(before)])
+        return any([self._verifier.check(closure) for closure in self._search.results(before)])
 
-    def _questions(
+    def _loop_candidates(
         self, number: int, count: int, min_score: float, spread: Callable[[int, int], np.ndarray]
-    ) -> list[Question]:
+    ) -> list[LoopCandidate]:
         """Searches of a node and those before it in the finished submaps near it, nearest first."""
         spacing = self.config.matcher.spacing
         first = max(number - self.config.loop.nodes + 1, 0)
@@ -382,7 +382,7 @@ class Slam:
         away = np.hypot(*(centers - transform(poses[number], points.mean(axis=0))).T)
         near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
         return [
-            Question(
+            LoopCandidate(
                 self.submaps[k],
                 number,
                 points,

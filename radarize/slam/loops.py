@@ -28,7 +28,7 @@ _WORKERS = 2
 
 
 @dataclass(frozen=True)
-class Question:
+class LoopCandidate:
     """Where in a submap is a node?
 
     Attributes:
@@ -67,47 +67,47 @@ class Closure:
 
 
 class LoopSearch:
-    """Answers questions in the background, in the order in which they were asked."""
+    """Answers candidates in the background, in the order in which they were asked."""
 
     def __init__(self, config: LoopConfig):
         self.config = config
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
-        self._asked: deque[tuple[int, Future]] = deque()
+        self._pending: deque[tuple[int, Future]] = deque()
         self._unpack = lru_cache(_PYRAMIDS)(self._build)
 
     def _build(self, submap: Submap) -> tuple[OccupancyGrid, Pyramid]:
         grid = submap.grid
         return grid, Pyramid.of(grid, self.config.levels, self.config.distance, free=self.config.front > 0)
 
-    def ask(self, questions: Sequence[Question]) -> None:
+    def submit(self, candidates: Sequence[LoopCandidate]) -> None:
         """Begin to search."""
-        for question in questions:
-            self._asked.append((question.node, self._pool.submit(self.answer, question)))
+        for candidate in candidates:
+            self._pending.append((candidate.node, self._pool.submit(self.search, candidate)))
 
-    def answers(self, before: int | None = None) -> list[Closure]:
+    def results(self, before: int | None = None) -> list[Closure]:
         """What was found for nodes up to `before`, or for all; waits for it."""
         found = []
-        while self._asked and (before is None or self._asked[0][0] <= before):
-            found.append(self._asked.popleft()[1].result())
+        while self._pending and (before is None or self._pending[0][0] <= before):
+            found.append(self._pending.popleft()[1].result())
         return [closure for closure in found if closure is not None]
 
-    def answer(self, question: Question) -> Closure | None:
+    def search(self, candidate: LoopCandidate) -> Closure | None:
         """Search around the guess, refine, and check the result again."""
-        c, submap, points = self.config, question.submap, question.points
+        c, submap, points = self.config, candidate.submap, candidate.points
         grid, pyramid = self._unpack(submap)
-        place = float(np.sqrt(np.linalg.eigvalsh(question.spread[:2, :2])[1]))
-        turn = float(np.sqrt(question.spread[2, 2]))
+        place = float(np.sqrt(np.linalg.eigvalsh(candidate.spread[:2, :2])[1]))
+        turn = float(np.sqrt(candidate.spread[2, 2]))
         # The mean residual that moves as much as the guess's covariance does.
         price = c.sigma**2 / max(len(points), 1)
         found = search(
             pyramid,
             points,
-            question.guess,
+            candidate.guess,
             distance=min(c.distance, max(3 * place, 4 * grid.resolution)),
             angle=min(c.angle, max(3 * turn, 0.05)),
-            min_score=question.min_score,
+            min_score=candidate.min_score,
             penalty=(price / place**2, price / turn**2),
-            fronts=question.fronts if c.front else None,
+            fronts=candidate.fronts if c.front else None,
         )
         if found is None:
             return None
@@ -116,12 +116,12 @@ class LoopSearch:
         moved = np.abs(between(pose, refined.pose))
         if max(moved[0], moved[1]) > 4 * grid.resolution or moved[2] > 0.1:
             return None  # the peak of the search is no minimum of the refinement: not a place that fits
-        covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
+        covariance = match_covariance(refined, c.translation_floor, c.rotation_floor)
         covariance += scatter(pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma)
-        return Closure(submap.anchor, question.node, refined.pose, covariance, score)
+        return Closure(submap.anchor, candidate.node, refined.pose, covariance, score)
 
 
-class Jury:
+class LoopVerifier:
     """Decides which closures move poses at once; the graph's final optimisation decides over all of them again.
 
     A closure that agrees with the present estimate is believed. One that contradicts it must be possible given how
@@ -132,29 +132,29 @@ class Jury:
     def __init__(self, graph: PoseGraph, drift: Drift, config: LoopConfig):
         self.graph, self.drift, self.config = graph, drift, config
         self._limit = float(chdtri(3, 1 - config.inlier_probability))
-        self._doubtful: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
+        self._contradicting: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
 
     def forget(self) -> None:
         """Begin anew with what is doubtful: nodes have other numbers now."""
-        self._doubtful.clear()
+        self._contradicting.clear()
 
-    def hear(self, closure: Closure) -> bool:
+    def check(self, closure: Closure) -> bool:
         """Enter a closure into the graph; True if poses should move for it now."""
         number = len(self.graph.closures)
         self.graph.add_closure(closure.anchor, closure.node, closure.pose, closure.covariance)
         poses = self.graph.poses
         error = between(between(poses[closure.anchor], poses[closure.node]), closure.pose)
         if self._fits(error, closure.covariance):
-            self.graph.believe(number)
+            self.graph.accept(number)
             return False
         if not self._fits(error, closure.covariance + self.drift.between(closure.anchor, closure.node)):
             return False
-        agreeing = [n for n, other in self._doubtful if self._agree(other, closure)]
-        self._doubtful.append((number, closure))
+        agreeing = [n for n, other in self._contradicting if self._agree(other, closure)]
+        self._contradicting.append((number, closure))
         if len(agreeing) + 1 < self.config.support:
             return False
         for n in (*agreeing, number):
-            self.graph.believe(n)
+            self.graph.accept(n)
         return True
 
     def _agree(self, first: Closure, second: Closure) -> bool:
@@ -170,7 +170,7 @@ class Jury:
         return float(error @ np.linalg.solve(covariance, error)) <= self._limit
 
 
-def uncertainty(result: Match, translation: float, rotation: float) -> Float[np.ndarray, "3 3"]:
+def match_covariance(result: Match, translation: float, rotation: float) -> Float[np.ndarray, "3 3"]:
     """Covariance of a match: the inverse of its information, with floors (m, rad); 10 m and 1 rad where blind."""
     blind = np.diag([1e-2, 1e-2, 1.0])
     return np.linalg.inv(result.information + blind) + np.diag([translation, translation, rotation]) ** 2

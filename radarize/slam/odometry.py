@@ -186,7 +186,7 @@ class Drift:
         return home @ (self._sums[high] - self._sums[low]) @ home.T + np.diag([shared, shared, 0.0]) ** 2
 
 
-class Stillness(Odometry):
+class ConstantMotion(Odometry):
     """Stands in where there is no odometry at all: the last motion, as the matcher found it, goes on."""
 
     def __init__(self, config: OdometryConfig):

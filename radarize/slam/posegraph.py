@@ -74,7 +74,7 @@ class PoseGraph:
         self.closures.append((of, to))
         self.accepted = np.append(self.accepted, False)
 
-    def believe(self, closure: int) -> None:
+    def accept(self, closure: int) -> None:
         """Let a closure move poses from the next `update` on."""
         if not self.accepted[closure]:
             self.accepted[closure] = True
@@ -130,7 +130,7 @@ class PoseGraph:
     def _step(self) -> None:
         if self._isam is None:
             self._isam, self._known = gtsam.ISAM2(_incremental(self._factorization)), 0
-            self._news = self._graph(self._believed())
+            self._news = self._graph(self._accepted_factors())
         self._isam.update(self._news, self._values(self._known))
         self._news, self._known = gtsam.NonlinearFactorGraph(), len(self.poses)
         self.poses[:] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
@@ -141,7 +141,7 @@ class PoseGraph:
             return
         if self._uncertain or self._matches:
             self._judge()
-        graph = self._graph(self._believed())
+        graph = self._graph(self._accepted_factors())
         values = gtsam.LevenbergMarquardtOptimizer(graph, self._values(), _levenberg()).optimize()
         self.poses[:] = gtsam.utilities.extractPose2(values)
         self._isam = None
@@ -151,7 +151,7 @@ class PoseGraph:
         solver finds it, that of odometry alone, and `solved` is False."""
         if not len(self.poses):
             return np.zeros((0, 3, 3))
-        graph, values = self._graph([self._counted(factor) for factor in self._believed()]), self._values()
+        graph, values = self._graph([self._counted(factor) for factor in self._accepted_factors()]), self._values()
         for solve in (gtsam.Marginals, _by_qr):
             try:
                 solution = solve(graph, values)
@@ -172,7 +172,7 @@ class PoseGraph:
             found[to] = carried(found[of], motion) + factor.noiseModel().covariance()
         return found
 
-    def _believed(self) -> list:
+    def _accepted_factors(self) -> list:
         new = np.ones(len(self._matches) - len(self._matches_kept), bool)
         keep = np.concatenate([self._matches_kept, new, self.accepted])
         return [factor for factor, keep in zip([*self._matches, *self._uncertain], keep, strict=True) if keep]

@@ -17,7 +17,7 @@ _ENOUGH = 3
 _SIDE, _SECTOR = 1.0, np.pi / 2
 
 
-def needless(submaps: Sequence[Submap], poses: Float[np.ndarray, "node 3"]) -> list[Submap]:
+def redundant_submaps(submaps: Sequence[Submap], poses: Float[np.ndarray, "node 3"]) -> list[Submap]:
     """Those at all of whose places enough of the later ones have been that stay."""
     seen, found = Counter(), []
     for submap in reversed(submaps):

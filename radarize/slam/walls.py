@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from jaxtyping import Float
 
-from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import associate_direction, from_right_angle
 from radarize.slam.config import WallsConfig
 
 #: rad: directions that are tried, and those that count as the same.
@@ -25,7 +25,7 @@ _LOST = np.radians(15.0)
 _POINTS, _CELL, _CELLS = 2000, 0.05, 1024
 
 
-class Direction(NamedTuple):
+class WallDirection(NamedTuple):
     """Of walls.
 
     Attributes:
@@ -37,13 +37,13 @@ class Direction(NamedTuple):
     contrast: float
 
     @classmethod
-    def of(cls, points: Float[np.ndarray, "point 2"]) -> "Direction":
+    def of(cls, points: Float[np.ndarray, "point 2"]) -> "WallDirection":
         """Of the walls that some points (m) lie on."""
         piled = _piled(np.ascontiguousarray(points[:: 1 + len(points) // _POINTS]), _TURNS)
         best = int(piled.argmax())
         before, at, after = piled[best - 1], piled[best], piled[(best + 1) % len(piled)]
         between = (before - after) / (2 * (before - 2 * at + after) or 1.0)
-        others = piled[np.abs(past_right_angle(_TURNS - _TURNS[best])) > _SAME]
+        others = piled[np.abs(from_right_angle(_TURNS - _TURNS[best])) > _SAME]
         return cls(float(_TURNS[best] + between * (_TURNS[1] - _TURNS[0])), float(at / others.max()))
 
 
@@ -54,7 +54,7 @@ class Walls:
         self.config = config
         self._known: list[dict[int, float]] = []  # of each direction the angles by node, each as seen from it
 
-    def meet(
+    def associate(
         self,
         node: int,
         points: Float[np.ndarray, "point 2"],
@@ -73,15 +73,15 @@ class Walls:
             The first node that had this direction, and the turn from its heading to that of this one, rad; None where
             nothing is told.
         """
-        found = Direction.of(points)
+        found = WallDirection.of(points)
         if found.contrast < self.config.contrast or any(node in known for known in self._known):
             return None
         variances = [drift(next(reversed(known)), node) + 2 * self.config.sigma**2 for known in self._known]
         near = [k for k, variance in enumerate(variances) if variance < _LOST**2]
         firsts = [next(iter(self._known[k].items())) for k in near]
         expected = np.array([headings[first] + angle for first, angle in firsts])
-        off = past_right_angle(expected - headings[node] - found.angle)
-        number = recognised(off, np.array(variances)[near], [len(self._known[k]) for k in near])
+        off = from_right_angle(expected - headings[node] - found.angle)
+        number = associate_direction(off, np.array(variances)[near], [len(self._known[k]) for k in near])
         if number is None:
             return None
         if number == len(near):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from radarize.odometry.bearings import YAW, Bearings
+from radarize.odometry.bearings import YAW, BearingTracker
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
@@ -47,10 +47,10 @@ def normal(degrees):
     return np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
 
 
-def followed(world, places, yaws, told, seed=1, blind=(0.0, 0.0), right_angles=True):
-    """Heading by `told` and the bearings, its claim, and the `Bearings`; nothing is seen between two instants, s."""
+def track(world, places, yaws, told, seed=1, blind=(0.0, 0.0), right_angles=True):
+    """Heading by `told` and the bearings, its claim, and the `BearingTracker`; nothing is seen between two instants, s."""
     rng, state = np.random.default_rng(seed), Gaussian(np.zeros(OWN))
-    bearings, found, claims = Bearings(MAPS, state, right_angles), np.zeros(len(yaws)), np.zeros(len(yaws))
+    bearings, found, claims = BearingTracker(MAPS, state, right_angles), np.zeros(len(yaws)), np.zeros(len(yaws))
     velocities = np.gradient(places, DT, axis=0)
     cos, sin = np.cos(yaws), np.sin(yaws)
     velocities = np.stack(
@@ -60,9 +60,9 @@ def followed(world, places, yaws, told, seed=1, blind=(0.0, 0.0), right_angles=T
         if k:
             state.mean[YAW] += told[k - 1]
             state.covariance[YAW, YAW] += CLAIM**2
-            bearings.move(DT, (velocity + velocities[k - 1]) / 2)
+            bearings.predict(DT, (velocity + velocities[k - 1]) / 2)
         echoes = world.seen(place, yaw, velocity, rng)
-        bearings.see(k * DT, [] if blind[0] <= k * DT < blind[1] else echoes, velocity)
+        bearings.update(k * DT, [] if blind[0] <= k * DT < blind[1] else echoes, velocity)
         found[k], claims[k] = state.mean[YAW], np.sqrt(state.covariance[YAW, YAW])
     return found, claims, bearings
 
@@ -86,13 +86,13 @@ def test_an_echo_remains_what_it_was(kind):
     places, yaw = slide()
     world = World(posts=[(1.3, 1.0)]) if kind else World(walls=[(normal(0), 1.3)])
     told = wrong(places, yaw)
-    found, claims, bearings = followed(world, places, yaw, told)
+    found, claims, bearings = track(world, places, yaw, told)
     assert abs(told.sum() - (yaw[-1] - yaw[0])) > np.radians(15)
     # How far a post is, and so by what it moves, is known to a few percent alone.
     assert np.abs(found - yaw).max() < np.radians((2, 6)[kind])
     assert abs(found[-1] - yaw[-1]) < 3 * claims[-1] and claims[-1] < np.radians(4)
-    assert [each.kind for each in bearings._followed] == [kind]
-    assert bool(bearings.flashes) == (kind == 0)
+    assert [each.kind for each in bearings._tracked] == [kind]
+    assert bool(bearings.specular_ranges) == (kind == 0)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -101,10 +101,10 @@ def test_several_echoes_tell_turns_by_themselves(seed):
     time = DT * np.arange(COUNT)
     places, yaw = np.stack([0.5 * time, np.zeros(COUNT)], axis=1), np.radians(20) * np.sin(0.8 * time)
     world = World([(normal(20), 5.0)], [(3.5, -0.7), (4.0, 0.5), (4.5, 1.4)])
-    found, _, bearings = followed(world, places, yaw, np.zeros(COUNT - 1), seed)
+    found, _, bearings = track(world, places, yaw, np.zeros(COUNT - 1), seed)
     assert np.abs(np.diff(yaw)).max() > CLAIM
     assert np.sqrt(np.mean((found - yaw) ** 2)) < np.radians(1.5)
-    assert {each.kind for each in bearings._followed} <= {0, 1, None}
+    assert {each.kind for each in bearings._tracked} <= {0, 1, None}
 
 
 def there_and_back(turn):
@@ -121,7 +121,7 @@ def test_a_wall_met_again_takes_back_what_the_heading_drifted(turn, second):
     centre = places[-1]
     world = World([(normal(0), 2.0), (normal(second), float(np.dot(normal(second), centre)) + 2.0)])
     told = np.diff(yaw) * (1 + 3 / abs(turn))
-    found, claims, bearings = followed(world, places, yaw, told, blind=(2.4, 4.0))
+    found, claims, bearings = track(world, places, yaw, told, blind=(2.4, 4.0))
     assert abs(found[119] - yaw[119]) > np.radians(2.5)
     assert abs(found[-1] - yaw[-1]) < np.radians(1.0) and claims[-1] < np.radians(1.0)
     assert len(bearings._walls) == 1 and bearings._walls[0] > 1
@@ -130,7 +130,7 @@ def test_a_wall_met_again_takes_back_what_the_heading_drifted(turn, second):
 def test_a_wall_at_no_right_angle_is_another_direction():
     places, yaw = there_and_back(60)
     world = World([(normal(0), 2.0), (normal(60), float(np.dot(normal(60), places[-1])) + 2.0)])
-    found, claims, bearings = followed(world, places, yaw, np.diff(yaw), blind=(2.4, 4.0))
+    found, claims, bearings = track(world, places, yaw, np.diff(yaw), blind=(2.4, 4.0))
     assert np.abs(found - yaw).max() < np.radians(1.5)
     assert len(bearings._walls) == 2
 
@@ -139,25 +139,25 @@ def test_what_moves_or_jumps_is_not_followed():
     still, wall = np.zeros(2), Echo(2.0, 0.0, 0.1)
     for other in (wall._replace(speed=0.6), wall._replace(range=2.3), wall._replace(bearing=0.3)):
         state = Gaussian(np.zeros(OWN))
-        bearings = Bearings(MAPS, state)
-        bearings.see(0.0, [wall], still)
+        bearings = BearingTracker(MAPS, state)
+        bearings.update(0.0, [wall], still)
         state.covariance[YAW, YAW] += CLAIM**2
-        bearings.see(DT, [other], still)
-        assert state.mean[YAW] == 0 and bearings._followed[0].frames == 1
+        bearings.update(DT, [other], still)
+        assert state.mean[YAW] == 0 and bearings._tracked[0].frames == 1
 
 
 def test_an_echo_out_of_sight_is_forgotten():
     state = Gaussian(np.zeros(OWN))
-    bearings = Bearings(MAPS, state)
+    bearings = BearingTracker(MAPS, state)
     for time in (0.0, 0.1, 0.5):
-        bearings.see(time, [Echo(2.0, 0.0, 0.1)] if time < 0.5 else [], np.zeros(2))
-    assert not bearings._followed and len(state.mean) == OWN
+        bearings.update(time, [Echo(2.0, 0.0, 0.1)] if time < 0.5 else [], np.zeros(2))
+    assert not bearings._tracked and len(state.mean) == OWN
 
 
 def test_right_angles_can_be_switched_off():
     places, yaw = slide()
     world, told = World(walls=[(normal(0), 1.3)]), np.diff(yaw)
-    walls = [len(followed(world, places, yaw, told, right_angles=on)[2]._walls) for on in (True, False)]
+    walls = [len(track(world, places, yaw, told, right_angles=on)[2]._walls) for on in (True, False)]
     assert walls == [1, 0]
     assert not MapRotation(MAPS, RotationConfig(right_angles=False))._bearings._right_angles
 

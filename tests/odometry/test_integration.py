@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from radarize.io.errors import InputError
 from radarize.io.pose import between, compose, exponential
 from radarize.odometry.doppler import DopplerVelocity, Velocities
-from radarize.odometry.integration import LASTING, Odometry, Track, VelocityConfig, VelocityFilter
+from radarize.odometry.integration import CORRELATION_TIME, Odometry, Track, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.odometry.uncertainty import SCALE, ErrorModel
 from radarize.radar.presets import PRESETS
@@ -231,7 +231,7 @@ def test_the_antennas_swing_about_the_origin():
 def test_errors_that_last_add_up_to_what_is_claimed(period):
     """Velocities wrong by 1 cm/s (RMS) as modelled, for as long as modelled: places over two seconds and more."""
     rng, size, frames = np.random.default_rng(3), 0.01, round(900 / period)
-    kept = np.exp(-period / LASTING)
+    kept = np.exp(-period / CORRELATION_TIME)
     drawn = np.sqrt(1 - kept**2) * rng.normal(size=(frames, 2))
     wrong = size * lfilter([1.0], [1.0, -kept], drawn, axis=0)
     told, heading = Told(variance=size**2).velocity(), Told().rotation()

@@ -198,7 +198,7 @@ def test_a_correction_claims_what_it_takes_back():
             state.update(state.row({YAW: 1.0}), noise * rng.normal() - state.mean[YAW], noise**2)
         return there
 
-    rotation._bearings.see = see
+    rotation._bearings.update = see
     found = rotation.estimate(of_spectrum(SIGNAL, np.arange(frames), np.arange(frames) / 30), standing(frames))
     told = found.seen & (np.arange(frames) > 0)  # and the radar never turned
     assert told.sum() == 149
@@ -222,11 +222,11 @@ def test_a_map_that_is_left_behind_is_empty():
     grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
     grid.blend(view, np.zeros(2), 0.0, 0.05)
     assert grid.correlate(view, np.zeros((1, 2)), yaws)[0][0] > 0.5
-    near = grid.follow(np.array([1.5, 0.0]))
+    near = grid.recenter(np.array([1.5, 0.0]))
     assert np.abs(near).max() < CELL
     assert grid.correlate(view, near[None] - [1.5, 0.0], yaws)[0][0] > 0.5
     for far in ([18.0, 0.0], [-6.0, 400.0], [0.0, -11.9]):
-        place = grid.follow(np.array(far))
+        place = grid.recenter(np.array(far))
         assert np.abs(place).max() < CELL
         assert grid.correlate(view, place[None], yaws)[0][0] == 0
         grid.blend(view, place, 0.0, 0.05)

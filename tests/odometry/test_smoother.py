@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.odometry.smoother import FixedLagSmoother, Gaussian, wandered
+from radarize.odometry.smoother import FixedLagSmoother, Gaussian, random_walk_covariance
 
 
 def test_against_least_squares():
@@ -100,7 +100,7 @@ def test_it_is_least_squares_over_everything():
         smoother.add_relative_motion(back, measured[k], noise)
         if k:
             rows.append(np.stack([value[k] - value[k - 1] - durations[k] * rate[k - 1], rate[k] - rate[k - 1]]))
-            values.append([0.0, 0.0]), weights.append(np.linalg.inv(wandered(wander, durations[k])))
+            values.append([0.0, 0.0]), weights.append(np.linalg.inv(random_walk_covariance(wander, durations[k])))
         if k >= back:
             rows.append(value[k : k + 1] - value[k - back]), values.append(measured[k : k + 1])
             weights.append(np.eye(1) / noise)
@@ -112,7 +112,7 @@ def test_it_is_least_squares_over_everything():
     among = [*range(frames), -1]
     assert smoother.covariance == pytest.approx(normal[np.ix_(among, among)], abs=1e-6)
     row = value[-1] - value[-2]
-    assert smoother.since(1) == pytest.approx(row @ normal @ row, abs=1e-6)
+    assert smoother.variance_since(1) == pytest.approx(row @ normal @ row, abs=1e-6)
 
 
 def test_frames_that_were_not_there_tie_nothing():
@@ -143,4 +143,4 @@ def test_a_gap_is_crossed_at_the_rate_of_before():
     before = smoother.values[-1]
     smoother.predict(1.0)
     assert smoother.values[-1] - before == pytest.approx(2.0, rel=0.02)
-    assert smoother.since(1) > 0.1**2 / 3
+    assert smoother.variance_since(1) > 0.1**2 / 3

@@ -13,7 +13,7 @@ from radarize.learning.nets.weights import Header, build, example, save
 from radarize.pipeline.method import Inputs
 from radarize.pipeline.networked import segmentation
 from radarize.radar.presets import PRESETS
-from radarize.scans.segmentation import NEAR, OUTERMOST, SegmentationScans, at_middles, first_surface
+from radarize.scans.segmentation import EDGE_OFFSET, HALF_WIDTH, SegmentationScans, at_column_centers, first_surface
 from radarize.signal.batch import Preprocessor, Signal
 from radarize.signal.bearings import BEARINGS
 from radarsim.sensors.scan import RAYS, Cell, Occupancy
@@ -43,7 +43,7 @@ def test_the_first_surface_is_where_it_is_likeliest():
             for h in likely[frame, :, bearing]:
                 first.append(h * left)
                 left *= 1 - h
-            rows = [range(max(0, k - NEAR), min(30, k + NEAR + 1)) for k in range(30)]
+            rows = [range(max(0, k - HALF_WIDTH), min(30, k + HALF_WIDTH + 1)) for k in range(30)]
             mass = [sum(first[i] for i in row) for row in rows]
             best = int(np.argmax(mass))
             expected = sum(i * first[i] for i in rows[best]) / mass[best] if mass[best] >= 0.4 else np.inf
@@ -61,14 +61,14 @@ def test_walls_at_an_angle_are_where_they_are(degrees):
     told = first_surface(np.where(label == Cell.SURFACE, 0.99, 1e-4), 0.5)
     ranges, true = told * CONFIG.range_resolution - CONFIG.range_bias, wall(away, normal, BEARINGS)
     there = np.isfinite(ranges) & (true < 4)
-    off, before = at_middles(ranges)[there] - true[there], ranges[there] - true[there]
+    off, before = at_column_centers(ranges)[there] - true[there], ranges[there] - true[there]
     assert abs(off.mean()) < 0.001
     assert np.sqrt(np.mean(off**2)) == pytest.approx(CONFIG.range_resolution / 12**0.5, rel=0.05)  # of whole bins
     assert abs(degrees) < 60 or before.mean() < -0.015
 
 
 def test_the_outermost_ray_is_the_labels():
-    assert RAYS.max(axis=1) - BEARINGS == pytest.approx(OUTERMOST * np.diff(BEARINGS)[0])
+    assert RAYS.max(axis=1) - BEARINGS == pytest.approx(EDGE_OFFSET * np.diff(BEARINGS)[0])
 
 
 def wall(away, normal, bearings):
@@ -80,8 +80,8 @@ def wall(away, normal, bearings):
 def test_no_step_between_two_things_is_a_wall():
     ranges = np.array([[1.0, 1.1, 1.2, 3.0, np.inf, 2.0, 2.0, np.inf]])
     expected = [[1 + 0.0375, 1.1 + 0.0375, 1.2 + 0.0375, 3.0, np.inf, 2.0, 2.0, np.inf]]
-    assert at_middles(ranges) == pytest.approx(np.array(expected))
-    assert at_middles(ranges[:, ::-1]) == pytest.approx(np.array(expected)[:, ::-1])
+    assert at_column_centers(ranges) == pytest.approx(np.array(expected))
+    assert at_column_centers(ranges[:, ::-1]) == pytest.approx(np.array(expected)[:, ::-1])
 
 
 @pytest.fixture

@@ -57,7 +57,7 @@ def test_a_graph_without_some_of_its_nodes():
     """Those left keep their place, their closures and, where nodes went, the motion as known."""
     graph, truth, _ = lap(0)
     for number in range(len(graph.closures)):
-        graph.believe(number)
+        graph.accept(number)
     graph.update()
     before, kept = graph.poses.copy(), [0, 1, 5, 14, 23, *range(100, 201)]
     graph.keep(kept, lambda a, b: np.eye(3) * 1e-4 * (b - a))

@@ -35,7 +35,7 @@ def test_odometry_alone_is_left_as_it_is():
 def test_updates_on_the_way_end_where_solving_at_once_does():
     graph, truth, odometry = lap(0)
     for closure in range(10):
-        graph.believe(closure)
+        graph.accept(closure)
         graph.update()
     on_the_way = np.array(graph.poses)
     graph.optimise()
@@ -81,7 +81,7 @@ def test_matches_and_closures_that_err_alike_claim_as_much_as_one():
         for k in range(4):
             found.add_match(0, 1, np.array([1.2, 0, 0]), 0.04 * np.eye(3))
             found.add_closure(0, 1, np.array([1.2, 0, 0]), 0.04 * np.eye(3))
-            found.believe(k)
+            found.accept(k)
         found.optimise()
         return found
 
@@ -104,7 +104,7 @@ def test_steps_known_to_a_tenth_of_a_millimetre_beside_such_that_are_not_known_a
         if k > 40 and k % 4 == 0:
             loop = between(graph.poses[k - 40], graph.poses[k]) + rng.normal(0, 0.5, 3)
             graph.add_closure(k - 40, k, loop, np.diag([600.0, 0.01, 15.0]))
-            graph.believe(len(graph.closures) - 1)
+            graph.accept(len(graph.closures) - 1)
             graph.update()
     graph.optimise()
     assert np.isfinite(graph.poses).all() and np.isfinite(graph.covariances()).all()
@@ -118,7 +118,7 @@ def chain(known, unknown):
         graph.add_node(compose(graph.poses[-1], np.array([0.3, 0, 0])))
         graph.add_motion(k, k + 1, np.array([0.3, 0, 0]), np.eye(3) * (unknown if k == 2 else known))
     graph.add_closure(0, 5, np.array([1.5, 0, 0]), np.eye(3) * unknown)
-    graph.believe(0)
+    graph.accept(0)
     return graph
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from radarize.io.pose import transform
-from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import associate_direction, from_right_angle
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig, WallsConfig
-from radarize.slam.walls import Direction, Walls
+from radarize.slam.walls import WallDirection, Walls
 from tests.slam.world import box, play, walk
 
 BEARINGS = np.radians(np.linspace(-60, 60, 61))
@@ -32,19 +32,19 @@ def round_room(radius):
 
 @pytest.mark.parametrize("degrees", [-44.9, -20.1, 0.0, 0.6, 33.3, 89.95])
 def test_walls_have_the_direction_of_the_room(degrees):
-    found = Direction.of(seen(box(-2, -1.5, 2.5, 1.5), np.radians(degrees)))
-    assert np.degrees(past_right_angle(found.angle + np.radians(degrees))) == pytest.approx(0, abs=0.1)
+    found = WallDirection.of(seen(box(-2, -1.5, 2.5, 1.5), np.radians(degrees)))
+    assert np.degrees(from_right_angle(found.angle + np.radians(degrees))) == pytest.approx(0, abs=0.1)
     assert found.contrast > 3
 
 
 def test_a_wall_across_the_cells_end_is_one_wall():
     """Cells begin again after 51.2 m."""
-    near, far = (Direction.of(seen(box(x, 0, x + 3, 2), 0.3)) for x in (0, 50))
+    near, far = (WallDirection.of(seen(box(x, 0, x + 3, 2), 0.3)) for x in (0, 50))
     assert far.angle == pytest.approx(near.angle, abs=2e-3)
 
 
 def test_a_round_room_has_no_direction():
-    assert Direction.of(seen(round_room(2.0))).contrast < 1.3
+    assert WallDirection.of(seen(round_room(2.0))).contrast < 1.3
 
 
 def test_a_known_direction_a_new_one_and_one_in_doubt():
@@ -52,10 +52,10 @@ def test_a_known_direction_a_new_one_and_one_in_doubt():
     deviation, walls = np.radians(1.0), [20, 20]
     density = 20 * np.exp(-(0.5**2) / 2) / np.sqrt(2 * np.pi) / deviation
     assert density / (density + 0.5 / (np.pi / 2)) > 0.9
-    assert recognised(np.radians([0.5, 20.0]), deviation**2, walls) == 0
-    assert recognised(np.radians([20.0, -20.0]), deviation**2, walls) == 2
-    assert recognised(np.radians([1.0, -1.2]), deviation**2, walls) is None
-    assert recognised(np.zeros(0), deviation**2, []) == 0
+    assert associate_direction(np.radians([0.5, 20.0]), deviation**2, walls) == 0
+    assert associate_direction(np.radians([20.0, -20.0]), deviation**2, walls) == 2
+    assert associate_direction(np.radians([1.0, -1.2]), deviation**2, walls) is None
+    assert associate_direction(np.zeros(0), deviation**2, []) == 0
 
 
 def test_a_submap_is_parallel_to_the_first_of_its_direction_alone():
@@ -64,14 +64,14 @@ def test_a_submap_is_parallel_to_the_first_of_its_direction_alone():
     true, known = np.radians([0.0, 90.0, 30.0, 31.0, 0.0]), np.radians([0.0, 88.0, 30.0, 33.0, 3.0])
     wing = np.radians([0.0, 0.0, 30.0, 30.0, 0.0])
     told = [
-        walls.meet(node, seen(room, true[node] - wing[node], seed=node), known, lambda a, b: np.radians(2.0) ** 2)
+        walls.associate(node, seen(room, true[node] - wing[node], seed=node), known, lambda a, b: np.radians(2.0) ** 2)
         for node in range(5)
     ]
     assert told[0] is None and told[2] is None  # each is the first
     for node, first, turn in ((1, 0, 90.0), (3, 2, 1.0), (4, 0, 0.0)):
         assert told[node][0] == first and np.degrees(told[node][1]) == pytest.approx(turn, abs=0.2)
     walls.keep({1: 0, 3: 1, 4: 2})
-    told = walls.meet(3, seen(room, 0.0), np.radians([90.0, 31.0, 0.0, -2.0]), lambda a, b: np.radians(2.0) ** 2)
+    told = walls.associate(3, seen(room, 0.0), np.radians([90.0, 31.0, 0.0, -2.0]), lambda a, b: np.radians(2.0) ** 2)
     assert told[0] == 0 and np.degrees(told[1]) == pytest.approx(-90.0, abs=0.2)
 
 
@@ -83,7 +83,7 @@ def test_after_a_turn_that_nobody_saw_directions_are_new():
     def lost(a, b):
         return np.radians(30.0 if a < 2 <= b else 1.0) ** 2
 
-    told = [walls.meet(node, seen(room, seed=node), known, lost) for node in range(4)]
+    told = [walls.associate(node, seen(room, seed=node), known, lost) for node in range(4)]
     assert told[0] is None and told[2] is None
     for node, first in ((1, 0), (3, 2)):
         assert told[node][0] == first and np.degrees(told[node][1]) == pytest.approx(0, abs=0.2)

@@ -12,7 +12,7 @@ from radarize.slam.grid import OccupancyGrid
 from radarize.slam.node import Node
 
 
-class Drawing:
+class MapRenderer:
     """Occupancy grid of nodes at their poses.
 
     Args:
@@ -28,7 +28,7 @@ class Drawing:
         self._grid, self._nodes = OccupancyGrid.empty(self.config.map_resolution), []
         self._poses, self._reach = np.zeros((0, 3)), 0.0  # m, of the longest ray
 
-    def of(self, nodes: Sequence[Node], poses: Float[np.ndarray, "node 3"]) -> OccupancyGrid:
+    def render(self, nodes: Sequence[Node], poses: Float[np.ndarray, "node 3"]) -> OccupancyGrid:
         """Map of all nodes; those drawn before stay as they are if no end of a ray has moved by more than a cell."""
         count, cell = len(self._nodes), self.config.map_resolution
         known = count <= len(nodes) and all(a is b for a, b in zip(self._nodes, nodes, strict=False))

@@ -1,7 +1,7 @@
 """Where odometry was blind: no velocity, no match that tells the turn, or no frames at all.
 
 It goes on there by what it knew before, and nothing of the poses says so. A span runs from the last frame that could be
-trusted to the last that could not. Spans that sight parts for less than `BLINK` are one; one that is shorter than that
+trusted to the last that could not. Spans that sight parts for less than `SHORTEST` are one; one that is shorter than that
 in the end is a blink, which the filters are made for, and is left out.
 """
 
@@ -15,7 +15,7 @@ from radarize.odometry.integration import Track
 from radarize.radar.numbering import Numbering
 
 #: s
-BLINK = 0.3
+SHORTEST = 0.3
 #: Why, in the order in which they are named.
 CAUSES = ("no velocity", "no turn", "frames lost")
 
@@ -38,7 +38,7 @@ class Span(BaseModel):
         return self.stop_s - self.start_s
 
 
-class BlindSpans(BaseModel):
+class UnobservableSpans(BaseModel):
     """All spans, with their way, m, and its share of the whole way."""
 
     share_of_way: Amount
@@ -57,9 +57,9 @@ class Spans:
         one."""
         causes = {*causes}
         span = self._spans.pop() if self._spans else None
-        if span and 0 <= start - span.stop_s < BLINK:
+        if span and 0 <= start - span.stop_s < SHORTEST:
             start, way, causes = span.start_s, span.way_m + way, causes | {*span.why.split(" and ")}
-        elif span and span.lasts >= BLINK:
+        elif span and span.lasts >= SHORTEST:
             self._spans.append(span)
         why = " and ".join(sorted(causes, key=lambda cause: (*CAUSES, cause).index(cause)))
         self._spans.append(Span(start_s=start, stop_s=stop, way_m=way, why=why))
@@ -67,10 +67,10 @@ class Spans:
     @property
     def found(self) -> list[Span]:
         """All so far that are no blinks, in order of time."""
-        return sorted((span for span in self._spans if span.lasts >= BLINK), key=lambda span: span.start_s)
+        return sorted((span for span in self._spans if span.lasts >= SHORTEST), key=lambda span: span.start_s)
 
 
-class Blindness:
+class Observability:
     """Finds the spans of a stream; memory grows with their number alone.
 
     Args:
@@ -96,7 +96,7 @@ class Blindness:
             if self._last is None:
                 self._first, self._last = float(time), (number - 1, time)
             before, since = self._last
-            lost = number - before > 1 and time - since >= BLINK
+            lost = number - before > 1 and time - since >= SHORTEST
             if not velocity or not turn or lost:
                 flags = not velocity, not turn, lost
                 causes = (cause for cause, is_so in zip(CAUSES, flags, strict=True) if is_so)
@@ -105,15 +105,15 @@ class Blindness:
 
     def lost(self, start: float, stop: float) -> None:
         """Say that there are no frames from `start` to `stop` (s), at either end of the stream."""
-        if stop - start >= BLINK:
+        if stop - start >= SHORTEST:
             self._spans.add(start, stop, 0.0, ("frames lost",))
 
     @property
-    def found(self) -> BlindSpans:
+    def found(self) -> UnobservableSpans:
         """All so far, in order of time."""
         spans = self._spans.found
         way = sum(span.way_m for span in spans)
-        return BlindSpans(share_of_way=way / self.way if self.way > 0 else 0.0, way_m=way, spans=spans)
+        return UnobservableSpans(share_of_way=way / self.way if self.way > 0 else 0.0, way_m=way, spans=spans)
 
     def warnings(self) -> list[str]:
         """One sentence with times since the first frame, or none if there is nothing to say."""

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarize.odometry.blindness import Blindness
+from radarize.odometry.observability import Observability
 
 PERIOD = 0.05
 
@@ -24,7 +24,7 @@ def track(count, start=0.0, no_velocity=(), no_turn=()):
 
 
 def found(*tracks, period=PERIOD):
-    blind = Blindness(period)
+    blind = Observability(period)
     for each in tracks:
         blind.add(each)
     return blind
@@ -68,7 +68,7 @@ def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
 
 def test_batches_do_not_matter():
     whole = track(120, no_velocity=range(7, 31), no_turn=range(28, 90))
-    parts = Blindness(PERIOD)
+    parts = Observability(PERIOD)
     for k in range(0, 120, 7):
         part = SimpleNamespace(**{name: values[k : k + 7] for name, values in vars(whole).items()})
         parts.add(part)

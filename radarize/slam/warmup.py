@@ -10,7 +10,7 @@ from radarize.slam.config import SlamConfig
 _LAPS, _STEPS, _HALF = 2, 40, 2.0
 
 
-def rehearse(config: SlamConfig, azimuths: Float[np.ndarray, "beam"]) -> None:
+def warm_up(config: SlamConfig, azimuths: Float[np.ndarray, "beam"]) -> None:
     """Go round until places are met again: matches, walls and loops of closed submaps are all needed on the way.
 
     Args:

@@ -1,6 +1,5 @@
-"""Radar odometry. ``radarize.odometry(recording)`` estimates it, see `radarize.estimate_odometry`; the modules here are
-what it is made of.
-"""
+"""Radar odometry. Call it as ``radarize.odometry(recording)``, see `radarize.estimate_odometry`. This package holds its
+velocity and rotation estimators, their integration to a trajectory, and the error model."""
 
 import sys
 from types import ModuleType
@@ -8,10 +7,11 @@ from typing import Any
 
 
 class _Odometry(ModuleType):
-    """The package, which is called as the function of the same name: importing a module of it would hide that."""
+    """A callable package. Importing one of its modules replaces the function `radarize.odometry` by this package, so
+    the package forwards calls to that function."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """See `radarize.estimate_odometry`."""
+        """Estimate odometry, see `radarize.estimate_odometry`."""
         import radarize
 
         return radarize.estimate_odometry(*arguments, **options)

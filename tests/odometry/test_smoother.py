@@ -72,7 +72,7 @@ def test_what_errors_share_with_one_as_it_was():
     filter_.keep([2, 0])
     errors = errors[:, [2, 0]]
     assert filter_.covariance == pytest.approx(np.cov(errors.T), abs=0.01)
-    assert filter_.shared == pytest.approx((errors * was[:, None]).mean(axis=0), abs=0.01)
+    assert filter_.cross_covariance == pytest.approx((errors * was[:, None]).mean(axis=0), abs=0.01)
 
 
 def test_what_is_far_off_moves_little():

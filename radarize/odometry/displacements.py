@@ -66,16 +66,18 @@ class DisplacementIntegrator:
         for axis, smoother in enumerate(self._axes):
             smoother.predict(dt)
             smoother.add_relative_motion(back, displacement[axis], self.reach * covariance[axis, axis])
-        place = np.array([*(each.values[-1] for each in self._axes), yaw])
-        self._first = place if self._first is None else self._first
-        before, self._pose = self._pose, between(self._first, place)
+        position = np.array([*(each.values[-1] for each in self._axes), yaw])
+        self._first = position if self._first is None else self._first
+        previous, self._pose = self._pose, between(self._first, position)
         spread = np.diag([*(each.variance_since(1) for each in self._axes), 0.0])
         cos, sin = np.cos(yaw), np.sin(yaw)
-        turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        spread = turned @ spread @ turned.T + np.diag([1e-8, 1e-8, min(yaw_variance, np.pi**2)])
-        rate = turned[:2, :2] @ [each.rate for each in self._axes]
-        known = turned[:2, :2] @ np.diag([each.covariance[-1, -1] for each in self._axes]) @ turned[:2, :2].T
-        return self._pose, between(before, self._pose), spread, rate, known, back > 0
+        rotation = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        spread = rotation @ spread @ rotation.T + np.diag([1e-8, 1e-8, min(yaw_variance, np.pi**2)])
+        rate = rotation[:2, :2] @ [each.rate for each in self._axes]
+        velocity_covariance = (
+            rotation[:2, :2] @ np.diag([each.covariance[-1, -1] for each in self._axes]) @ rotation[:2, :2].T
+        )
+        return self._pose, between(previous, self._pose), spread, rate, velocity_covariance, back > 0
 
 
 def as_track(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bool = False) -> Track:

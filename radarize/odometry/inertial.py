@@ -85,7 +85,7 @@ class Imu:
             force, angular_velocity = mount.apply(force), mount.apply(angular_velocity)
         elif (up := force.mean(axis=0))[2] < _MIN_UPWARD * np.linalg.norm(up):
             raise InputError(
-                f"{recording.path}: has no /imu/mount, and the mean specific force is {np.round(up, 1).tolist()} m/s^2, "
+                f"{recording.path}: has no /imu/mount, and mean specific force is {np.round(up, 1).tolist()} m/s^2, "
                 "expected along z of the radar's axes; set the mounting of the IMU with `import --imu-turn`"
             )
         return cls(time, force, angular_velocity)

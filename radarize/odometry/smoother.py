@@ -25,9 +25,9 @@ class Gaussian:
         self.mean, self.covariance = np.zeros(len(variances)), np.diag(np.asarray(variances, float))
         self.cross_covariance = np.zeros(len(variances))
 
-    def remember(self, place: int) -> None:
+    def remember(self, index: int) -> None:
         """Start tracking the cross-covariance of all errors with the current error of one state."""
-        self.cross_covariance = self.covariance[place].copy()
+        self.cross_covariance = self.covariance[index].copy()
 
     def row(self, weights: dict[int, float]) -> Row:
         """Return the row with these weights, by the index of the state."""
@@ -39,24 +39,24 @@ class Gaussian:
         """Return the variance of a weighted sum."""
         return float(row @ self.covariance @ row)
 
-    def replace(self, place: int, row: Row) -> None:
+    def replace(self, index: int, row: Row) -> None:
         """Replace a state by a weighted sum of states."""
-        self.mean[place] = row @ self.mean
+        self.mean[index] = row @ self.mean
         spread = self.covariance @ row
-        own = row @ spread
-        self.covariance[place], self.covariance[:, place] = spread, spread
-        self.covariance[place, place] = own
-        self.cross_covariance[place] = row @ self.cross_covariance
+        own_variance = row @ spread
+        self.covariance[index], self.covariance[:, index] = spread, spread
+        self.covariance[index, index] = own_variance
+        self.cross_covariance[index] = row @ self.cross_covariance
 
-    def add(self, place: int, row: Row, offset: float, variance: float) -> None:
+    def add(self, index: int, row: Row, offset: float, variance: float) -> None:
         """Insert a state before an index: a weighted sum plus an offset and noise."""
         spread = self.covariance @ row
-        own = row @ spread + variance
-        self.mean = np.insert(self.mean, place, row @ self.mean + offset)
+        own_variance = row @ spread + variance
+        self.mean = np.insert(self.mean, index, row @ self.mean + offset)
         self.covariance = np.insert(
-            np.insert(self.covariance, place, spread, 0), place, np.insert(spread, place, own), 1
+            np.insert(self.covariance, index, spread, 0), index, np.insert(spread, index, own_variance), 1
         )
-        self.cross_covariance = np.insert(self.cross_covariance, place, row @ self.cross_covariance)
+        self.cross_covariance = np.insert(self.cross_covariance, index, row @ self.cross_covariance)
 
     def keep(self, places: list[int]) -> None:
         """Marginalise out all other states."""

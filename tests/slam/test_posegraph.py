@@ -74,7 +74,7 @@ def test_matches_and_closures_that_err_alike_claim_as_much_as_one():
     """Four of each, of variance 0.04 beside a step of 1: with alike = 4 they leave 1 / (1 / 1 + 2 / 0.04)."""
 
     def graph(alike):
-        found = PoseGraph(alike=alike)
+        found = PoseGraph(correlated=alike)
         found.add_node(np.zeros(3))
         found.add_node(np.array([1.0, 0, 0]))
         found.add_motion(0, 1, np.array([1.0, 0, 0]), np.eye(3))

@@ -23,7 +23,7 @@ def room():
 
 
 def burst(room, velocity, climb=0.0, turn=0.0, yaw=0.3, config=CONFIG, noise=20.0):
-    """A frame in the room's middle, moving at a velocity in the sensor frame at the burst's centre."""
+    """A frame in the middle of the room, at a velocity in the sensor frame at the burst's centre."""
 
     def pose(t):
         heading = yaw + turn * (t - config.burst_center)
@@ -65,7 +65,7 @@ def test_standing_still_is_exactly_zero(room):
 
 
 def test_a_walk_that_sets_in_is_not_standing(room):
-    """15 mm/s are slower than the threshold of standing, but many times what echoes are known to."""
+    """15 mm/s are below the threshold of standing still, but many standard deviations."""
     maps = Heatmaps(CONFIG)
     found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, (0.015, 0.0)), np.zeros(1)))
     assert found.velocity[0] == pytest.approx([0.015, 0.0], abs=0.006)
@@ -78,7 +78,7 @@ def test_people_are_outliers(room):
     rng = np.random.default_rng(5)
     person = np.array([3.5, 2.5, 0.0]) + [1.6, 0.8, 0.0] + rng.normal(0, 0.1, (30, 3))
     still = burst(room, (0.9, 0.0))
-    # Whoever runs at the radar while it drives closes faster: the same echoes from a faster radar.
+    # A person who runs towards the moving radar closes faster: simulated by the same echoes from a faster radar.
     other = burst((person, 100.0 * np.exp(2j * np.pi * rng.random(30))), (0.9 + 0.7, 0.0), noise=0.0)
     maps = Heatmaps(CONFIG)
     found = DopplerVelocity(maps).estimate(batch(CONFIG, still + other, np.zeros(1)))
@@ -113,7 +113,7 @@ def test_a_radar_whose_limit_is_below_walking_pace(room, speed):
 
 
 def echoes_about(rng, spread, count=60, speed=1.0):
-    """Echoes whose u_z varies by `spread` about what is read, of a sensor that moves straight ahead."""
+    """Echoes whose u_z varies by `spread` about the measured one; the sensor moves straight ahead."""
     u_y, read = rng.uniform(-0.8, 0.8, count), rng.normal(0, 0.1, count)
     u_z = read + rng.normal(0, spread, count)
     closing = speed * np.sqrt(1 - u_y**2 - u_z**2) + rng.normal(0, 0.003, count)
@@ -122,18 +122,18 @@ def echoes_about(rng, spread, count=60, speed=1.0):
 
 @pytest.mark.parametrize("spread", [0.1, 0.15])
 def test_unseen_elevation_does_not_shorten(spread):
-    # To second order an error of u_z costs E[u_x] spread^2 / (2 u_x^2), more where u_x is small.
+    # To second order an error of u_z reduces E[u_x] by spread^2 / (2 u_x^2), more where u_x is small.
     rng, noise = np.random.default_rng(6), np.array([0.003, 0.1, 0.005, 1.0, 0.15])
     draws = np.random.default_rng(0).random((200, 2))
-    told, untold = [], []
+    with_spread, without = [], []
     for _ in range(40):
         echoes = echoes_about(rng, spread)
-        told.append(_fit(echoes, draws, noise, 0.15, 3.8)[0][0] - 1)
+        with_spread.append(_fit(echoes, draws, noise, 0.15, 3.8)[0][0] - 1)
         echoes[:, 3] = 1e-6
-        untold.append(_fit(echoes, draws, np.array([0.03, 0.1, 0.005, 1.0, 0.15]), 0.15, 3.8)[0][0] - 1)
-    assert np.mean(untold) < -0.8 * spread**2 / 2
-    # Robust weights prefer the fast side of what is skewed now: some overshoot is left.
-    assert abs(np.mean(told)) < 0.5 * spread**2 / 2
+        without.append(_fit(echoes, draws, np.array([0.03, 0.1, 0.005, 1.0, 0.15]), 0.15, 3.8)[0][0] - 1)
+    assert np.mean(without) < -0.8 * spread**2 / 2
+    # Some overshoot is left, as the residuals are skewed and robust weights prefer their fast side.
+    assert abs(np.mean(with_spread)) < 0.5 * spread**2 / 2
 
 
 def test_elevation_of_one_echo_and_of_two_at_once():
@@ -155,7 +155,7 @@ def test_elevation_of_one_echo_and_of_two_at_once():
     assert maps.ranges[int(range_bin)] == pytest.approx(3.06, abs=0.05)
     assert (speed, u_y, u_z) == pytest.approx((0, 0.6 / 3.06, 0.9 / 3.06), abs=0.02)
     assert spread < 0.05**2
-    # Floor and ceiling in one cell: whatever the mean says, they are far apart.
+    # Floor and ceiling in one cell: the spread is large whatever the mean.
     spreads = [strongest([0.9, -0.9], [0.0, phase])[4] for phase in (0.7, 1.5, 2.3)]
     assert np.sqrt(np.median(spreads)) > 0.15
 
@@ -170,7 +170,8 @@ def test_other_configurations(room, preset):
 
 @pytest.mark.parametrize("board", ["iwr6843aop", "iwr6843ods"])
 def test_four_antennas_in_a_row(room, board):
-    """Elevation pairs give their bearings, once the receivers' signs are off: 1 cm/s, and no claim of less."""
+    """Bearings come from the elevation pairs, after the correction of the receivers' signs: RMSE of 1 cm/s and
+    consistent covariances."""
     config = CONFIG.changed("radar", board=board, start_frequency=60e9)
     adc = np.concatenate([burst(room, v, yaw=y, config=config) for v in VELOCITIES[:6] for y in (0.3, 2.1)])
     truth = np.repeat(VELOCITIES[:6], 2, axis=0)
@@ -182,7 +183,7 @@ def test_four_antennas_in_a_row(room, board):
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_any_board(room, board):
-    """However many antennas it has, in however many rows."""
+    """Boards with any number of antennas in any number of rows."""
     config = radar(board)
     found = DopplerVelocity(Heatmaps(config)).estimate(
         batch(config, burst(room, (0.6, 0.15), config=config), np.zeros(1))
@@ -192,7 +193,7 @@ def test_any_board(room, board):
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0), (0.3, 0.1), (0.94, 0.0), (1.0, 0.0)])
 def test_echoes_from_one_direction_are_no_singularity(direction):
-    """They say nothing of the speed across: it is unknown, not an error."""
+    """The speed across is unobservable: its covariance is large, and the solution finite."""
     draws = np.random.default_rng(0).random((50, 2))
     echoes = np.tile([0.2, *direction, 0.01, 100.0], (6, 1))
     noise = np.array([0.03, 0.1, 0.03, 0.2, 0.15])

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from radarize.odometry.doppler import DopplerVelocity, _fit
+from radarize.odometry.doppler import DopplerVelocity
+from radarize.odometry.mixture import fit_velocity
 from radarize.radar.boards import BOARDS
 from radarize.radar.presets import PRESETS
 from radarize.signal.heatmaps import Heatmaps
@@ -128,9 +129,10 @@ def test_unseen_elevation_does_not_shorten(spread):
     with_spread, without = [], []
     for _ in range(40):
         echoes = echoes_about(rng, spread)
-        with_spread.append(_fit(echoes, draws, noise, 0.15, 3.8)[0][0] - 1)
+        with_spread.append(fit_velocity(echoes, np.ones(len(echoes)), draws, noise, 0.015, 3.8)[0][0] - 1)
         echoes[:, 3] = 1e-6
-        without.append(_fit(echoes, draws, np.array([0.03, 0.1, 0.005, 1.0, 0.15]), 0.15, 3.8)[0][0] - 1)
+        rough = np.array([0.03, *noise[1:]])
+        without.append(fit_velocity(echoes, np.ones(len(echoes)), draws, rough, 0.015, 3.8)[0][0] - 1)
     assert np.mean(without) < -0.8 * spread**2 / 2
     # Some overshoot is left, as the residuals are skewed and robust weights prefer their fast side.
     assert abs(np.mean(with_spread)) < 0.5 * spread**2 / 2
@@ -151,7 +153,8 @@ def test_elevation_of_one_echo_and_of_two_at_once():
         echoes = estimator.echoes(maps.spectrum(adc)[0])
         return echoes[np.argmax(echoes[:, 5])]
 
-    range_bin, speed, u_y, u_z, spread, _ = strongest([0.9], [0.0])
+    range_bin, speed, u_y, u_z, spread, _, purity = strongest([0.9], [0.0])
+    assert purity > 0.99
     assert maps.ranges[int(range_bin)] == pytest.approx(3.06, abs=0.05)
     assert (speed, u_y, u_z) == pytest.approx((0, 0.6 / 3.06, 0.9 / 3.06), abs=0.02)
     assert spread < 0.05**2
@@ -197,5 +200,66 @@ def test_echoes_from_one_direction_are_no_singularity(direction):
     draws = np.random.default_rng(0).random((50, 2))
     echoes = np.tile([0.2, *direction, 0.01, 100.0], (6, 1))
     noise = np.array([0.03, 0.1, 0.03, 0.2, 0.15])
-    velocity, covariance, _ = _fit(echoes, draws, noise, 0.15, 3.8)
+    velocity, covariance, _ = fit_velocity(echoes, np.ones(len(echoes)), draws, noise, 0.015, 3.8)
     assert np.isfinite(velocity).all() and np.linalg.eigvalsh(covariance).max() > 1
+
+
+def test_two_echoes_in_one_cell_are_no_plane_wave():
+    """Of power p each at azimuths that the row resolves, one plane wave explains a half: (p / 2 p)."""
+    maps = Heatmaps(CONFIG)
+
+    def still(t):
+        return np.zeros((*t.shape, 3)), np.zeros(t.shape)
+
+    points = np.array([[3 * np.cos(a), 3 * np.sin(a), 0.0] for a in (-0.4, 0.4)])
+    adc = record(CONFIG, still, points, np.full(2, 400.0), np.zeros(1), np.random.default_rng(1), 5.0)
+    echoes = DopplerVelocity(maps).echoes(maps.spectrum(adc)[0])
+    both = echoes[np.argsort(-echoes[:, 5])[:2]]
+    assert sorted(both[:, 2]) == pytest.approx([-np.sin(0.4), np.sin(0.4)], abs=0.02)
+    assert both[:, 6] == pytest.approx(0.5, abs=0.08)
+
+
+def furnished(rng, velocity, direct=14, others=110):
+    """Echoes of a furnished room: few direct ones, and many that came over several surfaces and close more slowly."""
+    u_y = rng.uniform(-0.8, 0.8, direct + others)
+    closing = velocity[0] * np.sqrt(1 - u_y**2) + velocity[1] * u_y
+    closing[:direct] += rng.normal(0, 0.003, direct)
+    closing[direct:] *= rng.uniform(0.6, 1.0, others)
+    spread = np.r_[np.full(direct, 0.03**2), np.full(others, 0.22**2)]
+    echoes = np.column_stack([closing, u_y, np.zeros(direct + others), spread, np.full(direct + others, 1e4)])
+    return echoes, np.r_[np.full(direct, 5.0), np.full(others, 0.01)]
+
+
+NOISE = np.array([0.003, 0.1, 0.005, 0.4, 0.15])
+
+
+def test_few_direct_echoes_outweigh_many_slow_ones():
+    """Within 1 cm/s of 1.2 m/s. With equal odds, the many slow ones win and the speed is too small."""
+    rng, random = np.random.default_rng(3), np.random.default_rng(0).random((100, 2))
+    velocity, errors, equal = np.array([1.2, 0.1]), [], []
+    for _ in range(30):
+        echoes, odds = furnished(rng, velocity)
+        errors.append(fit_velocity(echoes, odds, random, NOISE, 0.015, 3.8)[0] - velocity)
+        equal.append(fit_velocity(echoes, np.ones(len(odds)), random, NOISE, 0.015, 3.8)[0] - velocity)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.01
+    assert np.sqrt(np.mean(np.square(equal))) > 0.03 and np.mean(equal, axis=0)[0] < -0.02
+
+
+def test_the_fit_is_the_likeliest_velocity():
+    """Against the mixture's likelihood on a grid of 1 mm/s, in float64 and without any step of the fit."""
+    rng, random = np.random.default_rng(8), np.random.default_rng(0).random((100, 2))
+    speed_noise, power_noise, azimuth_noise, elevation, _ = NOISE
+    for velocity in ([0.9, -0.2], [0.3, 0.05]):
+        echoes, odds = furnished(rng, np.array(velocity))
+        found = fit_velocity(echoes, odds, random, NOISE, 0.015, 3.8)[0]
+        grid = np.stack(np.meshgrid(*(c + np.arange(-0.04, 0.0401, 0.001) for c in velocity), indexing="ij"), axis=-1)
+        closing, u_y, u_z, spread, power = echoes.T
+        u_x = np.sqrt(1 - u_y**2 - spread)
+        v_x, v_y = grid[..., :1], grid[..., 1:]
+        variance = speed_noise**2 + power_noise**2 / power + (azimuth_noise * (v_y - v_x * u_y / u_x)) ** 2
+        variance = variance + 0.5 * spread**2 * (v_x / u_x) ** 2
+        residual = closing - v_x * u_x - v_y * u_y
+        gauss = np.exp(-0.5 * residual**2 / variance) / np.sqrt(2 * np.pi * variance)
+        likelihood = np.log(odds * gauss + 1 / 3.8).sum(axis=-1)
+        best = grid[np.unravel_index(likelihood.argmax(), likelihood.shape)]
+        assert found == pytest.approx(best, abs=0.002)

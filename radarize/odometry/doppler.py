@@ -90,7 +90,7 @@ class DopplerConfig(Frozen):
         "echoes do not move", ge=0
     )  # fmt: skip
     few: float = setting(
-        32.0, "number of inliers at which the covariance of the fit is doubled; it grows further with fewer inliers, "
+        24.0, "number of inliers at which the covariance of the fit is doubled; it grows further with fewer inliers, "
         "because more of them are multipath; chosen on 12 walks of 60 s (handheld, cart, robot; A to D of seeds 301 to "
         "304)", ge=0
     )  # fmt: skip
@@ -99,14 +99,13 @@ class DopplerConfig(Frozen):
         "speed; it comes from their elevation", ge=0
     )  # fmt: skip
     course_noise: float = setting(
-        0.0065, "rad, standard deviation of the error across the velocity that all echoes share: a common bias of "
+        0.004, "rad, standard deviation of the error across the velocity that all echoes share: a common bias of "
         "azimuth", ge=0
     )  # fmt: skip
     rough: float = setting(
-        0.06, "standard deviation of the shared error along and across the velocity where the array does not measure "
-        "elevation, as a share of the speed; twice that for rows of fewer than 8 antennas; chosen on two walks of 20 s "
-        "(handheld in A, seed 301; cart in C, seed 303) with two transmitters, the first also with one transmitter and "
-        "with two other boards", ge=0
+        0.03, "standard deviation of the shared error along and across the velocity where the array does not measure "
+        "elevation, as a share of the speed; twice that for rows of fewer than 8 antennas; chosen on walks of 12 s "
+        "(handheld in B, cart in D, seed 311) with one and two transmitters and with two other boards", ge=0
     )  # fmt: skip
     floor: float = setting(0.0005, "m/s, minimum standard deviation of a velocity", ge=0)
 

@@ -1,5 +1,8 @@
-"""Radar odometry. Call it as ``radarize.odometry(recording)``, see `radarize.estimate_odometry`. This package holds its
-velocity and rotation estimators, their integration to a trajectory, and the error model."""
+"""Radar odometry. Call it as ``radarize.odometry(recording)``, see `radarize.estimate_odometry`.
+
+`integration.Odometry` is the algorithm. It takes velocities from `doppler`, `learned` or `fused`, and yaw increments
+from `rotation` or `learned`; `uncertainty` is its error model.
+"""
 
 import sys
 from types import ModuleType

@@ -36,14 +36,10 @@ _SINE_NOISE, _BEARING_WALK = 0.04, np.radians(0.3)
 #: Maximum number of tracked echoes; time without detection after which a track ends, s; distance (m, rad) below which
 #: two echoes are one. Below 4.8 frames/s no echo is tracked, because associations there are often wrong.
 _MAX_TRACKED, _MAX_AGE, _DUPLICATE = 8, 0.21, (0.1, np.radians(10.0))
-#: Share of the parallax of specular reflections (0) and point scatterers (1); its standard deviations before and after
-#: the classification, per type; size of a point scatterer, m, which adds size over range.
-_KIND_SHARES, _SHARE_STD_BEFORE, _SHARE_STD_AFTER, _SCATTERER_SIZE = (
-    np.array([0.0, 1.0]),
-    np.array([0.02, 0.06]),
-    np.array([0.003, 0.015]),
-    0.02,
-)
+#: Share of the parallax of specular reflections (0) and point scatterers (1); size of a point scatterer, m; standard
+#: deviations of the share before and after the classification, per type. Size over range is added to the latter.
+_KIND_SHARES, _SCATTERER_SIZE = np.array([0.0, 1.0]), 0.02
+_SHARE_STD_BEFORE, _SHARE_STD_AFTER = np.array([0.02, 0.06]), np.array([0.003, 0.015])
 #: Classification of an echo: minimum log-odds, maximum standard deviation of its share; number of standard deviations
 #: from both types beyond which the echo is dropped, such as a double bounce or a moving object.
 _MIN_LOG_ODDS, _MAX_SHARE_STD, _NEITHER_SIGMAS = 10.0, 0.245, 3.5
@@ -170,11 +166,11 @@ class BearingTracker:
             return True
         place = self._index(k) + 1
         share, variance = self._state.mean[place], self._state.covariance[place, place]
-        odds = -((share - _KIND_SHARES) ** 2) / (variance + _SHARE_STD_BEFORE**2) / 2
-        if odds.max() < -(_NEITHER_SIGMAS**2) / 2:
+        log_likelihood = -((share - _KIND_SHARES) ** 2) / (variance + _SHARE_STD_BEFORE**2) / 2
+        if log_likelihood.max() < -(_NEITHER_SIGMAS**2) / 2:
             return False
-        if abs(odds[0] - odds[1]) > _MIN_LOG_ODDS and variance < _MAX_SHARE_STD**2:
-            each.kind = int(odds.argmax())
+        if abs(log_likelihood[0] - log_likelihood[1]) > _MIN_LOG_ODDS and variance < _MAX_SHARE_STD**2:
+            each.kind = int(log_likelihood.argmax())
             off = np.hypot(_SHARE_STD_AFTER[each.kind], each.kind * _SCATTERER_SIZE / each.echo.range)
             self._state.update(self._state.row({place: 1.0}), _KIND_SHARES[each.kind] - share, off**2)
         return True

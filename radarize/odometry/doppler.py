@@ -129,8 +129,8 @@ class DopplerVelocity:
         self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u))
         self._steering = self._steering.to(torch.complex64)
         self._array = _array(heatmaps, self._u)
-        # The phase of an echo follows the path from transmitter to target to receiver, so the velocity is that of the
-        # midpoint of the virtual array.
+        # The phase of an echo follows the path from the transmitter to the target to the receiver, so the measured
+        # velocity is that of the point midway between transmitter and receiver, averaged over the row.
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
         no_elevation, short_row = self.pairs is None, len(self.row) < ROW

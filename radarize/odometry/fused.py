@@ -37,25 +37,23 @@ class FusedVelocity:
 
     def estimate(self, batch: Batch) -> Velocities:
         """Return the velocities of the next frames."""
-        by_doppler = self.doppler.estimate(batch)
-        uncertain = np.linalg.eigvalsh(by_doppler.covariance)[:, -1] > self.settings.sure**2
-        by_network = self.learned.estimate(batch, uncertain | self.always)
+        doppler = self.doppler.estimate(batch)
+        uncertain = np.linalg.eigvalsh(doppler.covariance)[:, -1] > self.settings.sure**2
+        network = self.learned.estimate(batch, uncertain | self.always)
         # Beyond the speed range of the network its input maps are empty.
-        seen = by_network.seen & (np.hypot(*by_doppler.velocity.T) <= self.learned.limit)
-        by_network = replace(
-            by_network, seen=seen, covariance=np.where(seen[:, None, None], by_network.covariance, ANY_VELOCITY)
+        seen = network.seen & (np.hypot(*doppler.velocity.T) <= self.learned.limit)
+        network = replace(
+            network, seen=seen, covariance=np.where(seen[:, None, None], network.covariance, ANY_VELOCITY)
         )
-        roots = np.linalg.cholesky(by_network.covariance), np.linalg.cholesky(by_doppler.covariance)
+        roots = np.linalg.cholesky(network.covariance), np.linalg.cholesky(doppler.covariance)
         # An estimator without a measurement has no error in common with the other.
-        correlation = self.settings.correlation * (by_network.seen & by_doppler.seen)
+        correlation = self.settings.correlation * (network.seen & doppler.seen)
         common = correlation[:, None, None] * roots[0] @ roots[1].mT
-        difference = (by_network.velocity - by_doppler.velocity)[:, :, None]
-        total = by_network.covariance + by_doppler.covariance - common - common.mT
+        difference = (network.velocity - doppler.velocity)[:, :, None]
+        total = network.covariance + doppler.covariance - common - common.mT
         distance = (difference.mT @ np.linalg.solve(total, difference))[:, 0, 0]
-        weight = (by_network.covariance - common) @ np.linalg.inv(total)
-        velocity = by_network.velocity - (weight @ difference)[:, :, 0]
-        covariance = by_network.covariance - weight @ (by_network.covariance - common.mT)
+        weight = (network.covariance - common) @ np.linalg.inv(total)
+        velocity = network.velocity - (weight @ difference)[:, :, 0]
+        covariance = network.covariance - weight @ (network.covariance - common.mT)
         covariance *= np.maximum(distance / self.settings.gate, 1.0)[:, None, None]
-        return Velocities(
-            velocity, (covariance + covariance.mT) / 2, by_doppler.inliers, by_network.seen | by_doppler.seen
-        )
+        return Velocities(velocity, (covariance + covariance.mT) / 2, doppler.inliers, network.seen | doppler.seen)

@@ -73,13 +73,12 @@ class LearnedRotation:
         settings = settings or TurnConfig()
         self._net, header = compiled(weights, RotationNet, radar)
         trained = header.spacings
-        self._windows = header.windows(
-            radar, RotationNet.maker, [s for s in settings.spacings if s in trained] or trained
-        )
+        spacings = [s for s in settings.spacings if s in trained] or trained
+        self._windows = header.windows(radar, RotationNet.maker, spacings)
         self.spacings = self._windows.spacings
         size = self.spacings[-1] + 1
         self._longest = (size - 0.5) * radar.frame_period
-        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
+        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of the last `size` frames
         self._yaws = FixedLagSmoother(size, settings.wander, settings.fastest)
         self._inflation = settings.alike
 
@@ -90,7 +89,7 @@ class LearnedRotation:
         turns, back = self.turns(batch, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i, dt in enumerate(np.diff(times, prepend=before)):
-            last, known = self._yaws.values[-1], self._yaws.covariance[-2, -2]
+            last, variance = self._yaws.values[-1], self._yaws.covariance[-2, -2]
             self._yaws.predict(float(dt))
             if dt > self._longest:
                 # Measurements after a gap would also correct the yaw increment of the gap, but that correction would
@@ -99,7 +98,7 @@ class LearnedRotation:
             for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
                 self._yaws.add_relative_motion(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last
-            growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
+            growth[i] = max(self._yaws.covariance[-2, -2] - variance, 1e-8)
         measured = (back > 0).any(axis=0)
         growth[measured] *= self._inflation
         return Rotations.independent(yaw, growth, measured)

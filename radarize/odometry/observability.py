@@ -34,7 +34,7 @@ class Span(BaseModel):
     why: str
 
     @property
-    def lasts(self) -> float:
+    def duration(self) -> float:
         """Duration, s."""
         return self.stop_s - self.start_s
 
@@ -60,7 +60,7 @@ class Spans:
         span = self._spans.pop() if self._spans else None
         if span and 0 <= start - span.stop_s < SHORTEST:
             start, way, causes = span.start_s, span.way_m + way, causes | {*span.why.split(" and ")}
-        elif span and span.lasts >= SHORTEST:
+        elif span and span.duration >= SHORTEST:
             self._spans.append(span)
         why = " and ".join(sorted(causes, key=lambda cause: (*CAUSES, cause).index(cause)))
         self._spans.append(Span(start_s=start, stop_s=stop, way_m=way, why=why))
@@ -68,7 +68,7 @@ class Spans:
     @property
     def found(self) -> list[Span]:
         """All spans so far of at least `SHORTEST`, in order of time."""
-        return sorted((span for span in self._spans if span.lasts >= SHORTEST), key=lambda span: span.start_s)
+        return sorted((span for span in self._spans if span.duration >= SHORTEST), key=lambda span: span.start_s)
 
 
 class Observability:
@@ -121,7 +121,7 @@ class Observability:
         found = self.found
         if not found.spans:
             return []
-        longest, seconds = max(found.spans, key=lambda span: span.lasts), sum(span.lasts for span in found.spans)
+        longest, seconds = max(found.spans, key=lambda span: span.duration), sum(span.duration for span in found.spans)
         where, at = ("", "") if len(found.spans) == 1 else (f"in {len(found.spans)} spans, ", "in the longest ")
         return [
             f"heading or velocity was unobservable {where}for {seconds:.1f} s and "

@@ -1,20 +1,20 @@
-"""Yaw from range-azimuth maps: each frame is matched with a local map of the previous frames, which follows the sensor.
+"""Yaw from range-azimuth maps: each frame is matched with a local map that accumulates the previous frames.
 
-Pairwise matching of frames forces a choice of the spacing: every pair of consecutive frames adds the noise of one
-match, and frames far apart lose their overlap in turns. A local map with exponential forgetting covers both. Each frame
-is correlated with the map at a fan of yaws around the prediction, each at the position that the velocities then yield.
-The frame is blended into the map at the yaw of the highest correlation. As long as landmarks stay in view, errors do
-not accumulate.
+Matching pairs of frames forces a choice of their spacing: pairs of consecutive frames add the noise of one match per
+frame, and pairs far apart lose their overlap in turns. A local map with exponential forgetting has the advantages of
+both. Each frame is correlated with the map at a fan of yaws around the prediction. The position for each yaw follows
+from the velocities. The frame is blended into the map at the yaw with the highest correlation. As long as landmarks
+stay in view, errors do not accumulate.
 
 One filter fuses this match with the bearings of strong echoes and with wall directions that are observed again
-(`radarize.odometry.bearings`). Its state is the heading, the yaw rate, the yaw error of the map, and the unknowns of
+(`radarize.odometry.bearings`). Its states are the heading, the yaw rate, the yaw error of the map, and the unknowns of
 tracked echoes and walls.
 
-`MapRotation.features` computes what is matched:
+`MapRotation.features` computes the input of the match:
 
-- A wall's specular reflection is no landmark: as the sensor passes, it moves along the wall with the foot of the
-  perpendicular. It is 40 dB above the wall's texture, so the power per range-Doppler cell is limited, and the streaks
-  that it leaves over range and azimuth are removed by subtracting medians.
+- A wall's specular reflection is no landmark: it is at the foot of the perpendicular, which moves along the wall with
+  the sensor. It is 40 dB above the wall's texture, so the power per range-Doppler cell is limited, and the streaks that
+  it leaves over range and azimuth are removed by subtracting medians.
 - Capon's beamformer has a narrower main lobe than the windowed sum, and yields sharper matches.
 - As u_y = sin(azimuth) cos(elevation), echoes from above and below appear nearer to boresight. Measured elevations per
   cell are too noisy to correct this. A common factor for all sines (`RotationConfig.stretch`) gains nothing in
@@ -119,8 +119,8 @@ class RotationConfig(Frozen):
         np.radians(0.5), "rad, step of the fine yaw search; the coarse search has three times that", gt=0
     )
     wander: float = setting(
-        np.radians(66.0), "rad/s^1.5, random walk of the yaw rate of a handheld radar: its standard deviation after 1 "
-        "s", gt=0
+        np.radians(66.0), "rad/s^1.5, random walk of the yaw rate of a handheld radar: its standard deviation after "
+        "1 s", gt=0
     )  # fmt: skip
     fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of the yaw rate before any measurement", gt=0)
     yaw_noise: float = setting(np.radians(0.3), "rad, standard deviation of a match with correlation 1", gt=0)
@@ -147,13 +147,13 @@ class RotationConfig(Frozen):
 class MapRotation:
     """Rotation estimator with a local map; frames are pushed in order, in batches of any size.
 
-    Position in the map is integrated from the velocities. Yaw and yaw rate are states of a filter, in which the rate is
-    a random walk and matches are measurements; if a prior estimator is given, its yaw increments replace the prediction
-    by the rate. The search width follows the covariance of the filter. Where the yaw is unobservable, the map is
-    discarded.
+    The position in the map is integrated from the velocities. Yaw and yaw rate are states of a filter: the rate is a
+    random walk, and matches are measurements of the yaw. If a prior estimator is given, its yaw increments replace the
+    prediction by the rate. The search width follows the covariance of the filter. Where the yaw is unobservable, the
+    map is discarded.
 
     Args:
-        prior: estimator of yaw increments that predict the yaw.
+        prior: estimator of yaw increments, used as the prediction.
 
     Attributes:
         lag: see `RotationEstimator`.
@@ -170,16 +170,13 @@ class MapRotation:
         self._ranges = heatmaps.ranges[:_MAX_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
         self._state = Gaussian(np.array([0.0, s.fastest**2, 0.0]))
-        self._echoes, self._bearings = (
-            Echoes(heatmaps, self._first),
-            BearingTracker(heatmaps, self._state, s.right_angles),
-        )
+        self._echoes = Echoes(heatmaps, self._first)
+        self._bearings = BearingTracker(heatmaps, self._state, s.right_angles)
         self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
-        self._step_start = self._step_motion = np.zeros(
-            3
-        )  # pose before the last step, on its mean heading, and the step
+        # The last step, and the pose before it, with the mean heading of the step.
+        self._step_start = self._step_motion = np.zeros(3)
         self._prior = prior
 
     def features(
@@ -236,21 +233,19 @@ class MapRotation:
     ) -> tuple[float, float, bool, float, float]:
         """Fields of `Rotations` for a frame `dt` s after the previous one."""
         state, mean = self._state, (self._velocity + velocity) / 2
-        start, previous_yaw, known = state.mean[YAW], self._map_yaw, state.covariance[YAW, YAW]
+        start, previous_yaw, before = state.mean[YAW], self._map_yaw, state.covariance[YAW, YAW]
         state.remember(YAW)
         self._predict(dt, prior)
         self._bearings.predict(dt, mean)
         seen = self._bearings.update(time, echoes, velocity)
-        self._step_start, self._step_motion = (
-            np.array([*self._position, (previous_yaw + self._map_yaw) / 2]),
-            np.array([*(dt * mean), 0.0]),
-        )
+        self._step_start = np.array([*self._position, (previous_yaw + self._map_yaw) / 2])
+        self._step_motion = np.array([*(dt * mean), 0.0])
         self._position = self._position_at(0.0)
         seen = self._match(view) or seen
         variance, turned = state.covariance[YAW, YAW], state.mean[YAW] - start
         drift = _DRIFT**2 * abs(turned) if seen else self.settings.unseen**2 * dt
         # Share of the heading error that the previous one explains: regression of the errors of the filter.
-        correlation = max(state.cross_covariance[YAW] / known, 0.0) if known > 0 else 1.0
+        correlation = max(state.cross_covariance[YAW] / before, 0.0) if before > 0 else 1.0
         return turned, drift, seen, correlation, variance
 
     @property
@@ -267,9 +262,7 @@ class MapRotation:
         else:
             state.mean[YAW] += prior[0]
             state.covariance[YAW, YAW] += prior[1]
-        if (
-            state.covariance[YAW, YAW] - known > np.pi**2
-        ):  # heading unknown; a larger variance would only lose precision
+        if state.covariance[YAW, YAW] - known > np.pi**2:  # unobservable; a larger variance only loses precision
             state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
             state.covariance[YAW, YAW] = known + np.pi**2
 

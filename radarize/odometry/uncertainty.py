@@ -114,14 +114,10 @@ class MotionCovariance:
         """Propagate by a step."""
         half = np.asarray(errors.duration)[..., None] / 2
         kept = errors.correlation[..., [0, 1, 1]]
-        derivative = np.zeros(
-            (*self._joint.shape[:-2], 3, 3)
-        )  # derivative of the step by the errors of heading and velocity
+        derivative = np.zeros((*self._joint.shape[:-2], 3, 3))  # of the step by the errors of heading and velocity
         derivative[..., 0], derivative[..., :2, 1:] = half_turned(motion), _half_way(motion) * half[..., None]
-        transition, noise_gain = (
-            np.zeros_like(self._joint),
-            np.concatenate([derivative, np.broadcast_to(np.eye(3), derivative.shape)], -2),
-        )
+        noise_gain = np.concatenate([derivative, np.broadcast_to(np.eye(3), derivative.shape)], -2)
+        transition = np.zeros_like(self._joint)
         transition[..., :3, :3] = adjoint(inverse(motion))
         # The error of a rotation is the change of the heading error; the velocity of a step is the mean of those at its
         # ends.
@@ -130,11 +126,8 @@ class MotionCovariance:
         added = errors.variance - kept[..., :, None] * kept[..., None, :] * self._joint[..., 3:, 3:]
         self._joint = transition @ self._joint @ transition.mT + noise_gain @ _positive(added) @ noise_gain.mT
         self._joint[..., :3, :3] += errors.noise
-        self._to_start = (adjoint(inverse(motion)) @ self._to_start[..., None])[..., 0] + inverse(motion) * [
-            1.0,
-            1.0,
-            0.0,
-        ]
+        to_start = (adjoint(inverse(motion)) @ self._to_start[..., None])[..., 0]
+        self._to_start = to_start + inverse(motion) * [1.0, 1.0, 0.0]
 
     @property
     def covariance(self) -> Float[np.ndarray, "*window 3 3"]:

@@ -105,10 +105,10 @@ class Health:
             told.append(self._slow())
         for (kind, advice), spans in self._spans.items():
             if found := spans.found:
-                longest = max(found, key=lambda span: span.lasts)
+                longest = max(found, key=lambda span: span.duration)
                 start, stop = longest.start_s - self._first, longest.stop_s - self._first
                 told.append(
-                    f"{kind} for {sum(span.lasts for span in found):.1f} s, at the longest from {start:.1f} to "
+                    f"{kind} for {sum(span.duration for span in found):.1f} s, at the longest from {start:.1f} to "
                     f"{stop:.1f} s: {advice}"
                 )
         return told

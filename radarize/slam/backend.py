@@ -217,13 +217,13 @@ class Slam:
         """Whether the sensor has not moved since the last node, for longer than the duration of a node."""
         if not self.nodes or scan.time - self._open[0].time < self.config.node.duration:
             return False
-        place = self.odometry.pose(self.nodes[-1].time)
-        return not any(self._is_away(place, each, _STILL_SHARE) for each in (*self._open, scan))
+        pose = self.odometry.pose(self.nodes[-1].time)
+        return not any(self._is_away(pose, each, _STILL_SHARE) for each in (*self._open, scan))
 
-    def _is_away(self, place: np.ndarray, scan: Scan, share: float) -> bool:
+    def _is_away(self, pose: np.ndarray, scan: Scan, share: float) -> bool:
         """Whether a scan is farther from a pose than a share of the distance between nodes; always if there is no
         odometry."""
-        x, y, yaw = between(place, scan.odometry)
+        x, y, yaw = between(pose, scan.odometry)
         c = self.config.node
         no_odometry = isinstance(self.odometry, ConstantMotion)
         return no_odometry or np.hypot(x, y) >= share * c.distance or abs(yaw) >= share * c.angle
@@ -303,11 +303,9 @@ class Slam:
         points = _points_in_frame_of(middle, self._local, {k: self.nodes[k].points for k in submap.nodes})
         if len(points) < self.config.node.min_points:
             return
-        association = self._walls.associate(
-            middle, points, poses[:, 2], lambda *nodes: self._drift.between(*nodes)[2, 2]
-        )
-        if association is not None:
-            other, turn = association
+        parallel = self._walls.associate(middle, points, poses[:, 2], lambda *k: self._drift.between(*k)[2, 2])
+        if parallel is not None:
+            other, turn = parallel
             x, y, _ = between(poses[other], poses[middle])
             spread = np.diag([_UNOBSERVED, _UNOBSERVED, np.sqrt(2) * self.config.walls.sigma]) ** 2
             self.graph.add_match(other, middle, np.array([x, y, turn]), spread)

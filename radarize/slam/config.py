@@ -13,19 +13,23 @@ from radarize.io.yamlfile import read_settings
 class OdometryConfig(Frozen):
     """Standard deviations of one step, for odometry without covariances."""
 
-    translation: float = setting(0.02, "minimum of a step, m", gt=0)
-    rotation: float = setting(0.01, "minimum of a step, rad", gt=0)
-    translation_per_metre: float = setting(0.05, "m of translation error per m of translation", ge=0)
-    rotation_per_metre: float = setting(0.02, "rad of rotation error per m of translation", ge=0)
-    rotation_per_radian: float = setting(0.03, "rad of rotation error per rad of rotation", ge=0)
+    translation: float = setting(0.02, "minimum standard deviation of the translation, m", gt=0)
+    rotation: float = setting(0.01, "minimum standard deviation of the rotation, rad", gt=0)
+    translation_per_metre: float = setting(
+        0.05, "standard deviation of the translation per metre of the step, m/m", ge=0
+    )
+    rotation_per_metre: float = setting(0.02, "standard deviation of the rotation per metre of the step, rad/m", ge=0)
+    rotation_per_radian: float = setting(
+        0.03, "standard deviation of the rotation per radian of the step, rad/rad", ge=0
+    )
     scale: float = setting(
         0.01, "standard deviation of the scale error that all steps share, m/m; it is added to the covariances of "
         "odometry, which describe single steps", ge=0
     )  # fmt: skip
     missing_translation: float = setting(
-        0.3, "translation of a step without any odometry (constant velocity is assumed), m", gt=0
+        0.3, "standard deviation of the translation without any odometry (constant velocity is assumed), m", gt=0
     )
-    missing_rotation: float = setting(0.2, "rotation of a step without any odometry, rad", gt=0)
+    missing_rotation: float = setting(0.2, "standard deviation of the rotation without any odometry, rad", gt=0)
 
 
 class NodeConfig(Frozen):

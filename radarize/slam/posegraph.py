@@ -110,10 +110,8 @@ class PoseGraph:
             for a, b in pairwise(map(int, numbers))
         ]
         matches, closures = stays(self._match_factors), stays(self._closure_factors)
-        self._match_factors, self._closure_factors = (
-            chosen(self._match_factors, matches),
-            chosen(self._closure_factors, closures),
-        )
+        self._match_factors = chosen(self._match_factors, matches)
+        self._closure_factors = chosen(self._closure_factors, closures)
         self._accepted_matches = self._accepted_matches[matches[: len(self._accepted_matches)]]
         self.accepted = self.accepted[closures]
         self.closures = [tuple(factor.keys()) for factor in self._closure_factors]
@@ -180,9 +178,8 @@ class PoseGraph:
     def _accepted_factors(self) -> list:
         new = np.ones(len(self._match_factors) - len(self._accepted_matches), bool)
         keep = np.concatenate([self._accepted_matches, new, self.accepted])
-        return [
-            factor for factor, keep in zip([*self._match_factors, *self._closure_factors], keep, strict=True) if keep
-        ]
+        factors = [*self._match_factors, *self._closure_factors]
+        return [factor for factor, keep in zip(factors, keep, strict=True) if keep]
 
     def _downweighted(self, factor: gtsam.BetweenFactorPose2) -> gtsam.BetweenFactorPose2:
         """The factor of a match or a closure with its covariance multiplied by `correlated`."""

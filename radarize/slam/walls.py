@@ -72,7 +72,7 @@ class Walls:
 
         Returns:
             The first node with this direction, and the rotation from its heading to that of this node, rad; None if the
-                direction is new or ambiguous.
+            direction is new or ambiguous.
         """
         found = WallDirection.of(points)
         if found.contrast < self.config.contrast or any(node in known for known in self._known):

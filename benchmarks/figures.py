@@ -25,6 +25,8 @@ METHODS = {
 }
 #: Public lidar logs.
 LOGS = ("intel", "csail", "orebro")
+#: Scans that the page of results shows.
+EXTRACTORS = ("segmentation", "first-echo", "cfar", "radarhd")
 #: Odometry and scans whose run time the page of sizes and times shows.
 RUNS = (("fused", "segmentation"), ("doppler", "first-echo"))
 Row = Mapping[str, Any]
@@ -164,33 +166,22 @@ def simulator() -> str:
     return f"{ours:.0f} ms on one core; the paths of Sionna RT take {theirs:.1f} s"
 
 
-def paper() -> str:
-    """Odometry by the paper's protocol, beside the paper's figures."""
-    shown = [row for row in rows("odometry") if isinstance(row["paper: ATE m"], float)]
-    lines = [[row["odometry"], f"{row['ATE m']:.2f}", f"{row['paper: ATE m']:.2f}"] for row in shown]
-    return table(["odometry", "ATE, m (simulated)", "in the paper (real)"], lines)
-
-
 def scans() -> str:
-    """Scans and maps by method."""
+    """Scans and maps by method, and at the worst level of the multipath test."""
     head = {"within 10 cm %": 1, "returned %": 1, "ghosts left %": 1, "map F1 %": 1, "SLAM ATE m": 3}
+    worst = {"ghosts, % of returns": 1, "map F1, %": 1, "SLAM ATE, m": 3}
+    severe = {row["scans"]: row for row in rows("multipath") if row["levels"] == "most severe"}
     lines = [
-        [row["scans"], *(f"{row[name]:.{digits}f}" for name, digits in head.items())]
+        [
+            str(row["scans"]),
+            *(f"{row[name]:.{digits}f}" for name, digits in head.items()),
+            *(f"{severe[row['scans']][name]:.{digits}f}" for name, digits in worst.items()),
+        ]
         for row in rows("mapping")
-        if row["on"] == "all"
+        if row["on"] == "all" and row["scans"] in EXTRACTORS
     ]
-    return table(["scans by", *head], lines)
-
-
-def multipath() -> str:
-    """Ranking at the worst step."""
-    head = {"ghosts, % of returns": 1, "missed surfaces, % of bearings": 1, "map F1, %": 1, "SLAM ATE, m": 3}
-    lines = [
-        [row["scans"], *(f"{row[name]:.{digits}f}" for name, digits in head.items())]
-        for row in rows("multipath")
-        if row["levels"] == "most severe"
-    ]
-    return table(["scans by", *head], lines)
+    names = [f"{name[:-2]}, {name[-1]}" if name[-2] == " " else name for name in head]
+    return table(["scans by", *names, *(f"worst level: {name}" for name in worst)], lines)
 
 
 def conditions() -> str:
@@ -235,16 +226,16 @@ def realism() -> str:
 
 
 def back_end() -> str:
-    """Lidar logs beside Cartographer."""
+    """ATE on lidar logs, with Cartographer's in brackets."""
     logs = [row for row in rows("slam_backend") if row["case"] in [f"lidar, {log}" for log in LOGS]]
-    lines = [[log, f"{row['ATE m']:.3f} m", row["to beat"].split(",")[0]] for log, row in zip(LOGS, logs, strict=True)]
-    return table(["lidar log", "ATE", "Cartographer's at its best settings"], lines)
+    found = (f"{row['ATE m']:.3f} ({row['to beat'].split(' m')[0]})" for row in logs)
+    return f"{', '.join(found)} m on {', '.join(LOGS)}"
 
 
 #: Figures by name.
 FIGURES: dict[str, Callable[[], str]] = {
-    "readme": readme, "walks": walks, "walks-mean": walks_mean, "long-walks-mean": long_walks_mean, "paper": paper,
-    "scans": scans, "multipath": multipath, "conditions": conditions, "radars": radars, "real": real,
+    "readme": readme, "walks": walks, "walks-mean": walks_mean, "long-walks-mean": long_walks_mean,
+    "scans": scans, "conditions": conditions, "radars": radars, "real": real,
     "realism": realism, "back-end": back_end, "clock-gap": clock_gap, "live-time": live_time,
     "live-dropped": live_dropped, "sizes": sizes, "heatmap-share": heatmap_share, "simulator": simulator,
 }  # fmt: skip

@@ -24,7 +24,7 @@ THEN = tuple(
             ("", "physics"),
             ("about", "results limits faq others trials glossary"),
         ),
-        (("howto", "python datasets train gpu method compare radarhd sizes troubleshooting"),),
+        (("howto", "python datasets gpu train method compare radarhd sizes troubleshooting"),),
     )
 )
 #: Pages that are generated, or hold nothing to type.

@@ -25,7 +25,7 @@ def setting(default: object, about: str, **limits: Any) -> Any:
     return Field(default, description=about, **limits)
 
 
-def complaint(error: ValidationError) -> str:
+def format_validation_error(error: ValidationError) -> str:
     """The first thing that is wrong: field, value, and what is expected."""
     first = error.errors()[0]
     field = ".".join(map(str, first["loc"])) or "file"

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from radarize.io.errors import InputError
 from radarize.io.files import read_text
-from radarize.io.plain import complaint
+from radarize.io.plain import format_validation_error
 
 Settings = TypeVar("Settings", bound=BaseModel)
 #: Bytes of a file, of which PyYAML makes some hundreds each; values in it, counted as often as aliases repeat them; how
@@ -92,7 +92,7 @@ def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settin
     try:
         return type(defaults).model_validate(changed(defaults, changes))
     except ValidationError as error:
-        raise InputError(f"{path}: {complaint(error)}") from error
+        raise InputError(f"{path}: {format_validation_error(error)}") from error
 
 
 def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object]:

@@ -19,7 +19,7 @@ from radarize.io.canvas import axes_or_new, png
 from radarize.io.errors import InputError
 from radarize.io.files import read_bytes
 from radarize.io.pixels import MOST_PIXELS
-from radarize.io.plain import complaint
+from radarize.io.plain import format_validation_error
 from radarize.io.pose import transform
 from radarize.io.replacing import replacing
 from radarize.io.yamlfile import read_yaml
@@ -57,7 +57,7 @@ class MapFile(BaseModel):
         try:
             return cls.model_validate(read_yaml(path, _DESCRIPTION))
         except ValidationError as error:
-            raise InputError(f"{path}: {complaint(error)}") from error
+            raise InputError(f"{path}: {format_validation_error(error)}") from error
 
 
 @dataclass(frozen=True)

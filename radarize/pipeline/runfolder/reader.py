@@ -17,7 +17,7 @@ from radarize.io.errors import InputError, explained
 from radarize.io.files import regular
 from radarize.io.hdf5 import dataset, open_hdf5
 from radarize.io.jsonfile import read_json
-from radarize.io.plain import complaint
+from radarize.io.plain import format_validation_error
 from radarize.io.replacing import write_whole
 from radarize.io.tum import read_tum
 from radarize.odometry.blindness import BlindSpans
@@ -125,7 +125,7 @@ class RunFolder:
         try:
             found = BlindSpans.model_validate(self.facts["blind"])
         except ValidationError as error:
-            raise InputError(f"{self.path / 'run.json'}: blind.{complaint(error)}") from error
+            raise InputError(f"{self.path / 'run.json'}: blind.{format_validation_error(error)}") from error
         start = float(self.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
@@ -141,7 +141,7 @@ class RunFolder:
         try:
             found = TypeAdapter(list[Condition]).validate_python(self.facts.get("health", []))
         except ValidationError as error:
-            raise InputError(f"{self.path / 'run.json'}: health.{complaint(error)}") from error
+            raise InputError(f"{self.path / 'run.json'}: health.{format_validation_error(error)}") from error
         start = float(self.trajectory[0][0])
         for each in found:
             each.start_s, each.stop_s = each.start_s - start, each.stop_s - start

@@ -97,8 +97,8 @@ class Recording:
 
     def _leave_out_unwritten(self) -> None:
         """Leave out frames at the end that have neither stamps nor samples: those that were about to be written."""
-        mended, count = set(self._stamps.mended.tolist()), len(self._stamps.rows)
-        while self._adc is not None and count and (row := int(self._stamps.rows[count - 1])) in mended:
+        corrected, count = set(self._stamps.corrected.tolist()), len(self._stamps.rows)
+        while self._adc is not None and count and (row := int(self._stamps.rows[count - 1])) in corrected:
             if self._rows_of(self._adc).stored(row):
                 break
             count -= 1

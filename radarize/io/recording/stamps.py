@@ -29,7 +29,7 @@ class Stamps:
     Attributes:
         times: (frame,) s, ascending.
         rows: (frame,) rows of the file that the frames are in, ascending.
-        mended: rows whose stamps are made anew.
+        corrected: rows whose stamps are made anew.
         left_out: rows without a frame, for no stamp can be made.
     """
 
@@ -37,7 +37,7 @@ class Stamps:
     period: float
     times: Float[np.ndarray, "frame"] = field(init=False)
     rows: Int[np.ndarray, "frame"] = field(init=False)
-    mended: Int[np.ndarray, "mended"] = field(init=False)
+    corrected: Int[np.ndarray, "corrected"] = field(init=False)
     left_out: Int[np.ndarray, "left"] = field(init=False)
 
     def __post_init__(self):
@@ -48,20 +48,20 @@ class Stamps:
             self.times, made = _filled(self.written, good, self.period)
         self.rows = np.flatnonzero(made)
         self.times = self.times[self.rows]
-        self.mended, self.left_out = np.flatnonzero(made & ~good), np.flatnonzero(~made)
+        self.corrected, self.left_out = np.flatnonzero(made & ~good), np.flatnonzero(~made)
 
     def keep(self, rows: Bool[np.ndarray, "frame"]) -> None:
         """Leave further frames out."""
         self.left_out = np.union1d(self.left_out, self.rows[~rows])
         self.times, self.rows = self.times[rows], self.rows[rows]
-        self.mended = np.intersect1d(self.mended, self.rows)
+        self.corrected = np.intersect1d(self.corrected, self.rows)
 
     def warnings(self) -> list[str]:
         """A sentence on damaged stamps, where there are any."""
-        damaged = len(self.mended) + len(self.left_out)
+        damaged = len(self.corrected) + len(self.left_out)
         if not damaged:
             return []
-        found = [f"{len(self.mended)} are made anew from the frame period"] if len(self.mended) else []
+        found = [f"{len(self.corrected)} are made anew from the frame period"] if len(self.corrected) else []
         found += [f"{len(self.left_out)} frames are left out"] if len(self.left_out) else []
         return [f"{damaged} of {len(self.written)} stamps in /radar/time are damaged: {', '.join(found)}"]
 

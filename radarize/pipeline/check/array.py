@@ -14,7 +14,7 @@ import numpy as np
 
 from radarize.io.errors import InputError
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.orientation import mirrored
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
@@ -47,16 +47,16 @@ class Candidate:
     Attributes:
         kind: of the fault that it would be.
         words: what would be wrong.
-        remedy: what would mend it.
+        remedy: what would correct it.
         reading: of the channels.
-        mending: of the samples.
+        correction: of the samples.
     """
 
     kind: str
     words: str
     remedy: str
     reading: Reading
-    mending: Mending
+    correction: Correction
 
 
 def candidates(config: RadarConfig) -> Iterator[Candidate]:
@@ -67,7 +67,7 @@ def candidates(config: RadarConfig) -> Iterator[Candidate]:
         slots = [config.slot[k] for k in inverse]  # of physical transmitters, if chirps stayed where they are
         firings = tuple(config.tx[k] for k in np.argsort(slots))
         tx = ",".join("+".join(str(t + 1) for t in fired(firing)) for firing in firings)
-        change = Mending(config.model_copy(update={"tx_order": firings}), _taken(2, inverse))
+        change = Correction(config.model_copy(update={"tx_order": firings}), _taken(2, inverse))
         held = ", ".join(f"{names[order[k]]} in place of {names[k]}" for k in range(len(order)) if order[k] != k)
         yield Candidate(
             "transmitter order",
@@ -78,14 +78,14 @@ def candidates(config: RadarConfig) -> Iterator[Candidate]:
         )
         yield Candidate(
             "transmitter order", held, "reorder the transmitters' axis", Reading.of(config, tx=order, moved=True),
-            Mending(samples=_taken(2, inverse)),
+            Correction(samples=_taken(2, inverse)),
         )  # fmt: skip
     for order in _orders(len(config.rx)):
         held = ", ".join(
             f"RX{config.rx[order[k]] + 1} in place of RX{config.rx[k] + 1}" for k in range(len(order)) if order[k] != k
         )
-        mending = Mending(samples=_taken(3, list(np.argsort(order))))
-        yield Candidate("receiver order", held, "reorder the receivers' axis", Reading.of(config, rx=order), mending)
+        correction = Correction(samples=_taken(3, list(np.argsort(order))))
+        yield Candidate("receiver order", held, "reorder the receivers' axis", Reading.of(config, rx=order), correction)
     band = config.start_frequency > _BAND
     for name, board in BOARDS.items():
         if (board.design_frequency > _BAND) != band or _alike(config, name):
@@ -95,7 +95,7 @@ def candidates(config: RadarConfig) -> Iterator[Candidate]:
         except InputError:
             continue
         words = f"channels fit the {name}, not the {load_board(config.board)}"
-        yield Candidate("board", words, f"import it with --board {name}", Reading.of(other), Mending(other))
+        yield Candidate("board", words, f"import it with --board {name}", Reading.of(other), Correction(other))
 
 
 def _orders(count: int) -> list[tuple[int, ...]]:
@@ -154,7 +154,7 @@ def antennas(evidence: Evidence) -> Iterator[Finding]:
         best = _upright([each for sigmas, _, each in tried if sigmas > margin - _ALIKE], best, evidence)
         yield Finding(
             best.kind, f"{pure:.0%} of the echoes are plane waves with {best.words}, {now:.0%} as configured",
-            sureness(margin, _SIGMAS), best.remedy, best.mending, hides=True,
+            sureness(margin, _SIGMAS), best.remedy, best.correction, hides=True,
         )  # fmt: skip
 
 
@@ -171,7 +171,7 @@ def _upright(rivals: list[Candidate], best: Candidate, evidence: Evidence) -> Ca
     """
     for rival in sorted(rivals, key=lambda each: each is not best):
         try:
-            if not list(mirrored(evidence.mended(rival.mending))):
+            if not list(mirrored(evidence.corrected(rival.correction))):
                 return rival
         except NotObservable:
             break

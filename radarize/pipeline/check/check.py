@@ -57,14 +57,14 @@ def check(recording: Source, fix: str | Path | None = None) -> Check:
 
     Args:
         recording: a recording or a file, or frames of one such as ``rec[:300]``.
-        fix: recording to write (``.h5``) in which all is mended that reordering, exchange or another configuration
-            mends; a board's file (``.yaml``) if that is what is wrong.
+        fix: recording to write (``.h5``) in which all is corrected that reordering, exchange or another configuration
+            corrects; a board's file (``.yaml``) if that is what is wrong.
 
     Returns:
         ``.findings`` (kind, what was measured, how sure, remedy), ``.not_observable`` (why by kind), ``.well``.
 
     Raises:
-        InputError: an unusable recording, one without samples, or nothing to be mended with `fix`.
+        InputError: an unusable recording, one without samples, or nothing to be corrected with `fix`.
 
     Example:
         >>> rz.check(rec).well
@@ -77,9 +77,9 @@ def check(recording: Source, fix: str | Path | None = None) -> Check:
         raise InputError(f"{frames.recording.path}: has no whole frame, expected at least one")
     found = check_evidence(Evidence.of(frames))
     if fix is not None:
-        from radarize.pipeline.check.mending import write_mended
+        from radarize.pipeline.check.correction import write_corrected
 
-        write_mended(frames, found.findings, Path(fix))
+        write_corrected(frames, found.findings, Path(fix))
     return found
 
 
@@ -126,14 +126,14 @@ _CHECKED: WeakKeyDictionary[Recording, dict[range, Check]] = WeakKeyDictionary()
 def check_evidence(evidence: Evidence, tests: Iterable[Test] = TESTS, before: tuple[Finding, ...] = ()) -> Check:
     """Tests on evidence.
 
-    What hides others is mended for the tests that follow; if it cannot be, these are not made.
+    What hides others is corrected for the tests that follow; if it cannot be, these are not made.
 
     Args:
         tests: in their order.
-        before: what others found; mended in the evidence or not.
+        before: what others found; corrected in the evidence or not.
     """
     findings, unseen = [*before], {}
-    blocked = next((each.kind for each in before if each.hides and each.mending is None), "")
+    blocked = next((each.kind for each in before if each.hides and each.correction is None), "")
     for test in tests:
         hidden = blocked or ", ".join(each.kind for each in findings if each.kind in test.unless)
         if hidden:
@@ -146,8 +146,8 @@ def check_evidence(evidence: Evidence, tests: Iterable[Test] = TESTS, before: tu
             continue
         findings += found
         for each in found:
-            if each.mending is not None:
-                evidence = evidence.mended(each.mending)
+            if each.correction is not None:
+                evidence = evidence.corrected(each.correction)
             elif each.hides:
                 blocked = each.kind
     return Check(tuple(findings), unseen)

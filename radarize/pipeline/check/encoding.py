@@ -13,7 +13,7 @@ import numpy as np
 import scipy.fft
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
@@ -84,7 +84,7 @@ def order_of_words(evidence: Evidence) -> Iterator[Finding]:
         remedy, reading = readings(evidence.config)[kind]
         yield Finding(
             kind, f"the entropy of range and Doppler is {less[kind]:.2f} nats less if it is read otherwise",
-            sureness(less[kind], _LESS), remedy, Mending(samples=reading), hides=True,
+            sureness(less[kind], _LESS), remedy, Correction(samples=reading), hides=True,
         )  # fmt: skip
 
 
@@ -121,5 +121,5 @@ def i_and_q(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "I and Q", f"leakage at negative range is {-leak:.0f} dB stronger than at positive range",
             sureness(-leak, _LEAKS), f"import it with --iq-order {other}: I and Q are exchanged",
-            Mending(samples=lambda frames: np.ascontiguousarray(frames[..., ::-1])), hides=True,
+            Correction(samples=lambda frames: np.ascontiguousarray(frames[..., ::-1])), hides=True,
         )  # fmt: skip

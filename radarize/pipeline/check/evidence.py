@@ -11,7 +11,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Clip
 from radarize.io.trajectory import Trajectory
 from radarize.odometry.inertial import Imu
-from radarize.pipeline.check.finding import Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, NotObservable
 from radarize.pipeline.check.motion import Motions, find_motions
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.pipeline.check.summary import Sequence, Summary
@@ -77,26 +77,26 @@ class Evidence:
             imu = None
         return cls(frames.config, frames.times, frames.valid, read, frames.truth, imu, np.asarray(frames.numbers))
 
-    def mended(self, mending: Mending) -> "Evidence":
-        """What it would be of the mended recording."""
-        config, read, change = mending.config or self.config, self._read, mending.samples
+    def corrected(self, correction: Correction) -> "Evidence":
+        """What it would be of the corrected recording."""
+        config, read, change = correction.config or self.config, self._read, correction.samples
         times, valid, numbers = self.times, self.valid, self.numbers
-        if (order := mending.order) is not None:
+        if (order := correction.order) is not None:
             valid, numbers = valid[order], numbers[order]
-            times = times[: len(order)] if mending.keeps_stamps else times[order]
-        if mending.period is not None:
-            times = times[0] + mending.period * np.arange(len(times))
+            times = times[: len(order)] if correction.keeps_stamps else times[order]
+        if correction.period is not None:
+            times = times[0] + correction.period * np.arange(len(times))
 
-        def mend(first: int, last: int) -> Frames:
+        def corrected_frames(first: int, last: int) -> Frames:
             if order is None:
                 samples = read(first, last)
             else:
                 samples = np.concatenate([read(k, k + 1) for k in order[first:last]])
             return samples if change is None else change(samples)
 
-        mended = Evidence(config, times, valid, mend, self.truth, self.imu, numbers)
-        mended.places = self.places
-        return mended
+        corrected = Evidence(config, times, valid, corrected_frames, self.truth, self.imu, numbers)
+        corrected.places = self.places
+        return corrected
 
     def read(self, start: int, stop: int) -> Frames:
         """Frames start...stop-1."""

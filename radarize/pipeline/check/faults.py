@@ -40,7 +40,7 @@ TESTS = (
     Test(levels.scaled, ("samples scaled",)),
     Test(
         levels.receivers,
-        ("receiver dead", "receiver saturated", "channels alike", "receiver copied", "transmitter copied"),
+        ("receiver dead", "receiver saturated", "channels identical", "receiver copied", "transmitter copied"),
     ),
     Test(levels.transmitters, ("transmitter dead",)),
     Test(stamps.bursts, ("stamps too dense",)),

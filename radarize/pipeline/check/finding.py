@@ -11,7 +11,7 @@ from radarize.radar.config import RadarConfig
 
 
 @dataclass(frozen=True)
-class Mending:
+class Correction:
     """What turns wrong samples into right ones, without losing any.
 
     Attributes:
@@ -37,16 +37,16 @@ class Finding:
         kind: which one, a key of `radarize.pipeline.check.faults.FAULTS`.
         measured: what was measured, with units.
         sure: how sure it is, 0 to 1.
-        remedy: which option or change mends it.
-        mending: how a corrected recording is written; None where none can be.
-        hides: nothing that comes after it in the samples can be judged unless it is mended.
+        remedy: which option or change corrects it.
+        correction: how a corrected recording is written; None where none can be.
+        hides: nothing that comes after it in the samples can be judged unless it is corrected.
     """
 
     kind: str
     measured: str
     sure: float
     remedy: str
-    mending: Mending | None = field(default=None, compare=False, repr=False)
+    correction: Correction | None = field(default=None, compare=False, repr=False)
     hides: bool = False
 
     def __str__(self) -> str:
@@ -56,7 +56,7 @@ class Finding:
         """As JSON has it."""
         return {
             "kind": self.kind, "measured": self.measured, "sure": round(self.sure, 3), "remedy": self.remedy,
-            "mendable": self.mending is not None,
+            "correctable": self.correction is not None,
         }  # fmt: skip
 
 

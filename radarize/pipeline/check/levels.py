@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.radar.config import firing_name
 from radarize.radar.noise import noise_floor, noise_profile
 
@@ -53,7 +53,7 @@ def offset_binary(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "offset-binary samples", f"{far:.0%} of the samples lie beyond half of full scale, on both sides",
             sureness(far, 0.9), "import it with --encoding offset-binary",
-            Mending(samples=lambda frames: frames ^ np.int16(-32768)), hides=True,
+            Correction(samples=lambda frames: frames ^ np.int16(-32768)), hides=True,
         )  # fmt: skip
 
 
@@ -104,7 +104,7 @@ def _copies(frames: np.ndarray, dead: np.ndarray, evidence: Evidence) -> Iterato
     copied = [(a, b) for b in range(len(tx)) for a in range(b) if same(channels[a], channels[b])]
     if len(rx) > 1 and len(pairs) == len(rx) * (len(rx) - 1) // 2:
         yield Finding(
-            "channels alike", f"all {len(rx)} receivers hold the same samples", 1.0,
+            "channels identical", f"all {len(rx)} receivers hold the same samples", 1.0,
             "look at what made the file: one receiver was written for all", hides=True,
         )  # fmt: skip
         return
@@ -170,7 +170,7 @@ def scaled(evidence: Evidence) -> Iterator[Finding]:
     if factor > 1:
         yield Finding(
             "samples scaled", f"all samples are multiples of {factor}", 1.0, f"divide them by {factor}",
-            Mending(samples=lambda frames: frames // np.int16(factor)),
+            Correction(samples=lambda frames: frames // np.int16(factor)),
         )  # fmt: skip
         return
     signal = np.ascontiguousarray(evidence.samples[::RARE], np.float32).view(np.complex64)[..., 0]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
@@ -47,7 +47,7 @@ def upside_down(evidence: Evidence) -> Iterator[Finding]:
             "upside down", f"the accelerometer reads {up:.1f} m/s^2 along the radar's upward axis",
             sureness(-up, _UPRIGHT),
             "turn the radar, or take a board file whose antennas have left and up negated (--board)",
-            Mending(_turned(evidence.config, -1, -1)),
+            Correction(_turned(evidence.config, -1, -1)),
         )  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def mirrored(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "azimuth mirrored", f"{opposite:.0%} of {len(pairs)} turns and sideways motions are to the other side than "
             f"{'an IMU' if evidence.truth is None else 'true poses'} have them", opposite,
-            "take a board file whose antennas have left negated (--board)", Mending(_turned(evidence.config, -1, 1)),
+            "take a board file whose antennas have left negated (--board)", Correction(_turned(evidence.config, -1, 1)),
         )  # fmt: skip
 
 
@@ -81,7 +81,7 @@ def elevation_mirrored(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "elevation mirrored", f"{opposite:.0%} of {len(pairs)} motions are downward where true poses go upward",
             opposite, "take a board file whose antennas have up negated (--board)",
-            Mending(_turned(evidence.config, 1, -1)),
+            Correction(_turned(evidence.config, 1, -1)),
         )  # fmt: skip
 
 

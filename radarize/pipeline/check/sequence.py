@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.tracks import range_rate_factor
 
@@ -43,7 +43,7 @@ def repeated(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "frames frozen", f"{frozen} of {len(digest)} frames hold the samples of the frame before", 1.0,
             "look at what captured it: a buffer was not filled in time; leave these frames out",
-            Mending(order=order), hides=True,
+            Correction(order=order), hides=True,
         )  # fmt: skip
     if copied:
         start = evidence.times[np.flatnonzero(again & ~before)[0]] - evidence.times[0]
@@ -51,7 +51,7 @@ def repeated(evidence: Evidence) -> Iterator[Finding]:
             "frames repeated", f"{copied} of {len(digest)} frames hold samples of earlier ones, from {start:.1f} s on",
             1.0,
             "look at what made the file: a part was written twice; leave these frames out",
-            None if frozen else Mending(order=order), hides=not frozen,
+            None if frozen else Correction(order=order), hides=not frozen,
         )  # fmt: skip
 
 
@@ -61,22 +61,24 @@ def shuffled(evidence: Evidence) -> Iterator[Finding]:
     looks = evidence.sequence.looks[seen]
     share = _out_of_order(_similar(looks))
     if share > _SHUFFLED:
-        mending = None
+        correction = None
         if len(seen) <= _SORTED:
             order = seen[_sorted(looks)]
             if _out_of_order(_similar(evidence.sequence.looks[order])) < share / 4:
-                mending = Mending(order=_forward(evidence, order), keeps_stamps=True)
+                correction = Correction(order=_forward(evidence, order), keeps_stamps=True)
         yield Finding(
             "frames shuffled", f"{share:.0%} of the frames are most like others than the ones next to them",
             sureness(share, _SHUFFLED), "look at what made the file: frames were not sorted by their number",
-            mending, hides=True,
+            correction, hides=True,
         )  # fmt: skip
 
 
 def _forward(evidence: Evidence, order: np.ndarray) -> np.ndarray:
     """The order or its reverse, whichever has ranges fall where Doppler says so."""
     try:
-        factor = range_rate_factor(evidence.mended(Mending(order=order, keeps_stamps=True)).tracks, evidence.times)
+        factor = range_rate_factor(
+            evidence.corrected(Correction(order=order, keeps_stamps=True)).tracks, evidence.times
+        )
     except NotObservable:
         return order
     return order[::-1] if factor.value < 0 else order
@@ -89,7 +91,7 @@ def reversed_(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "frames reversed", f"ranges change {factor.value:.2f} +- {factor.error:.2f} times as fast as Doppler says",
             sureness(-factor.value / max(factor.error, 1e-3), 5.0), "read the frames in the other order",
-            Mending(order=np.arange(len(evidence))[::-1], keeps_stamps=True), hides=True,
+            Correction(order=np.arange(len(evidence))[::-1], keeps_stamps=True), hides=True,
         )  # fmt: skip
 
 

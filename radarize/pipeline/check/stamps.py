@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.tracks import range_rate_factor
 from radarize.radar.numbering import Numbering
@@ -26,7 +26,7 @@ def bursts(evidence: Evidence) -> Iterator[Finding]:
             "stamps too dense", f"{short.mean():.0%} of the frames begin {_time(float(np.median(steps[short])))} after "
             f"the one before, but a burst takes {_time(config.burst_time)}", 1.0,
             f"count stamps from the frame period, {_time(config.frame_period)}",
-            Mending(period=config.frame_period), hides=True,
+            Correction(period=config.frame_period), hides=True,
         )  # fmt: skip
 
 
@@ -37,20 +37,20 @@ def period(evidence: Evidence) -> Iterator[Finding]:
     if abs(step / config.frame_period - 1) < _STEP:
         return
     measured = f"stamps are {_time(step)} apart, the configured frame period is {_time(config.frame_period)}"
-    remedy, mending = "look which of them is right: --frame-period", None
+    remedy, correction = "look which of them is right: --frame-period", None
     try:
         by_stamps = range_rate_factor(evidence.tracks, evidence.times).value
         by_period = by_stamps * step / config.frame_period
         if abs(abs(by_stamps) - 1) < 0.1:
             measured += f"; ranges change {abs(by_stamps):.2f} times as fast as Doppler says by the stamps"
             remedy = f"set the frame period to {_time(step)} (--frame-period)"
-            mending = Mending(config.model_copy(update={"frame_period": step}))
+            correction = Correction(config.model_copy(update={"frame_period": step}))
         elif abs(abs(by_period) - 1) < 0.1:
             measured += f"; ranges change {abs(by_period):.2f} times as fast as Doppler says by the configuration"
-            remedy, mending = "count stamps from the frame period", Mending(period=config.frame_period)
+            remedy, correction = "count stamps from the frame period", Correction(period=config.frame_period)
     except NotObservable:
         pass
-    yield Finding("frame period", measured, sureness(abs(step / config.frame_period - 1), _STEP), remedy, mending)
+    yield Finding("frame period", measured, sureness(abs(step / config.frame_period - 1), _STEP), remedy, correction)
 
 
 def missing(evidence: Evidence) -> Iterator[Finding]:

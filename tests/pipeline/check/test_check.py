@@ -1,4 +1,4 @@
-"""Faults put into a simulated walk, one after the other: found, named, and mended where they can be."""
+"""Faults put into a simulated walk, one after the other: found, named, and corrected where they can be."""
 
 import json
 
@@ -29,10 +29,10 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording, RecordingWriter
 from radarize.odometry.inertial import Imu
 from radarize.pipeline.check.check import check, check_evidence, warnings_before
+from radarize.pipeline.check.correction import write_corrected
 from radarize.pipeline.check.evidence import Evidence
 from radarize.pipeline.check.faults import TESTS
-from radarize.pipeline.check.finding import Finding, Mending
-from radarize.pipeline.check.mending import write_mended
+from radarize.pipeline.check.finding import Correction, Finding
 from radarize.radar.boards import load_board
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
@@ -101,14 +101,14 @@ def test_a_standing_radar_is_not_judged_by_its_motion(whole):
     ],
 )  # fmt: skip
 def test_fix_gives_the_samples_back(whole, harm, tmp_path):
-    """Byte by byte, with configuration and stamps; and nothing is found in what was mended."""
+    """Byte by byte, with configuration and stamps; and nothing is found in what was corrected."""
     source = write(harmed(whole, harm), tmp_path / "wrong.h5")
     assert not check(source, tmp_path / "right.h5").well
     with Recording(tmp_path / "right.h5") as right:
         np.testing.assert_array_equal(right.adc(0, len(right)), whole.adc)
         assert right.config == whole.config
         np.testing.assert_allclose(right.times, whole.times)
-        assert "mended by radarize check" in str(right.attributes["warnings"])
+        assert "corrected by radarize check" in str(right.attributes["warnings"])
     assert check(tmp_path / "right.h5").well
 
 
@@ -124,8 +124,8 @@ def test_repeated_frames_are_left_out(whole, tmp_path):
 def test_streams_come_along(path, whole, tmp_path):
     """An IMU as it was, and poses; rows of frames with their frames."""
     with Recording(path) as source:
-        mending = Mending(order=np.arange(len(source))[::-1], keeps_stamps=True)
-        write_mended(source[:], (Finding("x", "y", 1.0, "z", mending),), tmp_path / "right.h5")
+        correction = Correction(order=np.arange(len(source))[::-1], keeps_stamps=True)
+        write_corrected(source[:], (Finding("x", "y", 1.0, "z", correction),), tmp_path / "right.h5")
         with Recording(tmp_path / "right.h5") as right:
             np.testing.assert_array_equal(right.read("imu/gyroscope"), source.read("imu/gyroscope"))
             assert {*right.names()} == {*source.names()} - {n for n in source.names() if n.startswith("points/")}
@@ -137,20 +137,20 @@ def test_streams_come_along(path, whole, tmp_path):
 
 
 def test_the_right_board_is_written(whole, tmp_path):
-    """Left and right exchanged in a board's file, as an IMU sees: the mended file has them the right way."""
-    from radarize.pipeline.check.mending import _write_board
+    """Left and right exchanged in a board's file, as an IMU sees: the corrected file has them the right way."""
+    from radarize.pipeline.check.correction import _write_board
 
     wrong = harmed(whole, mirrored)
     (found,) = check_evidence(wrong.evidence).findings
-    mended = wrong.evidence.mended(found.mending)
+    corrected = wrong.evidence.corrected(found.correction)
     with Recording(write(wrong, tmp_path / "wrong.h5")) as recording:
-        _write_board(recording[:], mended, tmp_path / "board.yaml")
+        _write_board(recording[:], corrected, tmp_path / "board.yaml")
     board = load_board(tmp_path / "board.yaml")
     assert board.tx == load_board(whole.config.board).tx and board.rx == load_board(whole.config.board).rx
     assert yaml.safe_load((tmp_path / "board.yaml").read_text())["chip"] == "iwr1843"
 
 
-def test_nothing_to_mend_is_said(path, tmp_path):
+def test_nothing_to_correct_is_reported(path, tmp_path):
     with pytest.raises(InputError, match="no fault was found"):
         check(path, tmp_path / "right.h5")
     assert not list(tmp_path.iterdir())

@@ -18,8 +18,8 @@ from radarize.radar.cfg import write_cfg
 _BATCH = 16
 
 
-def write_mended(frames: Clip, findings: tuple[Finding, ...], output: Path) -> Path:
-    """Write a recording in which all is mended that can be; or, to a ``.yaml``, the board that is right.
+def write_corrected(frames: Clip, findings: tuple[Finding, ...], output: Path) -> Path:
+    """Write a recording in which all is corrected that can be; or, to a ``.yaml``, the board that is right.
 
     Args:
         frames: of the recording.
@@ -27,22 +27,22 @@ def write_mended(frames: Clip, findings: tuple[Finding, ...], output: Path) -> P
         output: file to write.
 
     Raises:
-        InputError: nothing can be mended, or `output` cannot be written.
+        InputError: nothing can be corrected, or `output` cannot be written.
     """
-    mended = [each for each in findings if each.mending is not None]
+    corrected = [each for each in findings if each.correction is not None]
     path = frames.recording.path
-    if not mended:
+    if not corrected:
         found = ", ".join(each.kind for each in findings) or "no fault"
-        raise InputError(f"{path}: --fix is given, but {found} was found, expected what reordering can mend")
+        raise InputError(f"{path}: --fix is given, but {found} was found, expected what reordering can correct")
     evidence = Evidence.of(frames)
-    for each in mended:
-        assert each.mending is not None
-        evidence = evidence.mended(each.mending)
+    for each in corrected:
+        assert each.correction is not None
+        evidence = evidence.corrected(each.correction)
     if output.suffix in SUFFIXES:
         return _write_board(frames, evidence, output)
     if output.exists() and output.samefile(path):
         raise InputError(f"{output}: is the recording that is read, expected another file")
-    return _write_recording(frames, evidence, output, [each.kind for each in mended])
+    return _write_recording(frames, evidence, output, [each.kind for each in corrected])
 
 
 def _write_board(frames: Clip, evidence: Evidence, output: Path) -> Path:
@@ -61,7 +61,7 @@ def _write_recording(frames: Clip, evidence: Evidence, output: Path, kinds: list
         streams = {name: each for name, each in streams.items() if not each.clock.startswith("points/")}
     attributes = {k: v for k, v in source.attributes.items() if k not in ("format", "radarize_version")}
     told = [str(attributes[name]) for name in ("warnings",) if attributes.get(name)]
-    attributes["warnings"] = "; ".join([*told, f"mended by radarize check: {', '.join(kinds)}"])
+    attributes["warnings"] = "; ".join([*told, f"corrected by radarize check: {', '.join(kinds)}"])
     with RecordingWriter(
         output, config, cfg_text=source.cfg_text if config == source.config else write_cfg(config),
         attributes=attributes, streams=streams, products=products,

@@ -114,7 +114,7 @@ class RunFolder:
         return [str(words) for words in found]
 
     @property
-    def blind(self) -> BlindSpans | None:
+    def unobservable_spans(self) -> BlindSpans | None:
         """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
 
         Raises:

@@ -61,9 +61,9 @@ def health(radar=CONFIG, **conditions):
 @pytest.mark.parametrize(
     ("condition", "kind", "advice"),
     [
-        ("no_turn", "blind", "turn more slowly"),
-        ("fast", "aliased", "speeds alias beyond 1.83 m/s: move more slowly, or use the `two-tx` preset"),
-        ("empty", "out of reach", "few surfaces within 4.2 m: the `long-range` preset sees 20"),
+        ("no_turn", "unobservable", "turn more slowly"),
+        ("fast", "aliased", "speeds above 1.83 m/s are aliased: move more slowly, or use the `two-tx` preset"),
+        ("empty", "out of reach", "few surfaces within 4.2 m: the `long-range` preset measures up to 20 m"),
         ("hit", "disturbed", "another radar may be near"),
         ("dead", "disturbed", "RX1 is dead"),
     ],
@@ -97,7 +97,7 @@ def test_the_receiver_has_the_boards_number():
 
 def test_a_limit_below_walking_pace_is_said_whatever_the_speed():
     (warning,) = Health(SLOW).warnings()
-    assert warning == f"the configuration's speed limit of {SLOW.max_velocity:.2f} m/s is below walking pace"
+    assert warning == f"the configuration's maximum speed of {SLOW.max_velocity:.2f} m/s is below walking pace"
     (span,) = health(SLOW, fast=range(40, 80)).found  # at 1 m/s all echoes ahead alias
     assert "is below walking pace: the `two-tx` preset measures up to 5.5 m/s" in span.advice
 

@@ -109,7 +109,7 @@ def test_a_corner_reflector(tmp_path, distance):
     assert np.degrees(centred(leftover).std()) < 0.1  # the wave is a sphere: 0.6 deg at 1.3 m
     assert (20 * np.log10(np.abs(leftover))).std() < 0.02
     assert found.values["range_bias"].value == pytest.approx(bias, abs=0.005)
-    with pytest.raises(InputError, match="no echo stands out within 0.5 m about 3.6 m"):
+    with pytest.raises(InputError, match="no strong echo is within 0.5 m of 3.6 m"):
         rz.calibrate(path, target=3.6)
     with pytest.raises(InputError, match=r"--target is 9 m, expected between 0.3 and 4.28 m"):
         rz.calibrate(path, target=9.0)
@@ -118,7 +118,7 @@ def test_a_corner_reflector(tmp_path, distance):
 def test_too_short_a_walk_shows_nothing(spoiled):
     with pytest.raises(InputError, match="expected a walk of about 20 s"):
         rz.calibrate(spoiled.recording[:20])
-    with Recording(spoiled.recording.path) as opened, pytest.raises(InputError, match="move|stands out"):
+    with Recording(spoiled.recording.path) as opened, pytest.raises(InputError, match="move|no strong echo"):
         rz.calibrate(opened, target=2.0)
 
 

@@ -46,7 +46,7 @@ class DiskFull(InputError):
 
 
 def of_system(error: OSError) -> str:
-    """Return the system's message and the file; if shared memory, which has no file name, is full, say so."""
+    """Return the system's message and the file; shared memory has no file name and is named if it is full."""
     if not error.filename and error.errno == errno.ENOSPC and os.path.isdir(SHARED_MEMORY):
         if shutil.disk_usage(SHARED_MEMORY).free < _SHARED:
             return f"{SHARED_MEMORY}: {FULL}, expected room for what processes exchange: free some of it"

@@ -146,7 +146,7 @@ def test_one_wrong_stamp_is_made_anew(walk, wrong, place):
         assert np.array_equal(recording.adc(place, place + 1)[0], ADC[place])
         if wrong != "twice" or place:
             assert recording.damage == [
-                "1 of 40 stamps in /radar/time are damaged: 1 are made anew from the frame period"
+                "1 of 40 stamps in /radar/time are damaged: 1 are interpolated by the frame period"
             ]
     part = walk.rename(walk.with_name("b.h5.part"))
     with Recording(recover(part)) as recording:
@@ -181,7 +181,7 @@ def test_a_block_of_stamps_that_was_never_written(walk, value):
     stamped(walk, np.full(COUNT, value))
     with Recording(walk) as recording:
         assert np.allclose(np.diff(recording.times), PERIOD) and np.array_equal(recording.adc(0, COUNT), ADC)
-        assert "40 are made anew" in recording.damage[0] or "39 are made anew" in recording.damage[0]
+        assert "40 are interpolated" in recording.damage[0] or "39 are interpolated" in recording.damage[0]
 
 
 def test_frames_without_stamps_and_samples_were_not_written(walk):

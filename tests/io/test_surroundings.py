@@ -50,7 +50,7 @@ def test_a_working_folder_that_was_deleted(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == 2
-    assert done.stderr == "radarize: the working folder was deleted, expected one that is there: cd to another\n"
+    assert done.stderr == "radarize: the working folder was deleted, expected an existing one: cd to another\n"
 
 
 def test_shared_memory_that_is_full(monkeypatch):

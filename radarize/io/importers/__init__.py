@@ -140,7 +140,7 @@ def _import_all(source: Path, output: Path, given: Given, count: int, progress: 
     for number, path in enumerate(outputs[1:], 2):
         if path.exists():
             raise InputError(
-                f"{path}: is there already, and capture {number} of {count} in {source} would go there, expected "
+                f"{path}: already exists, and capture {number} of {count} in {source} would replace it, expected "
                 f"another output, or capture, 1 to {count}"
             )
     written, notes = [], []

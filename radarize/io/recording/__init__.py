@@ -1,4 +1,4 @@
-"""The recording: one HDF5 file of raw I/Q with its configuration, and whatever truth came along.
+"""The recording: one HDF5 file of raw I/Q with the radar's configuration, and optional truth and other sensors.
 
 Layout (one chunk per frame, readable while it grows):
 
@@ -9,9 +9,10 @@ Layout (one chunk per frame, readable while it grows):
     /truth/NAME, /imu/NAME, /tracking/NAME, /points/NAME      optional, attributes `unit`, `about` and `clock`,
                                                               `labels` where values stand for something
 
-`clock` names the data set that says which frame or instant a row belongs to: ``radar/time`` for one row a frame,
-``imu/time`` (s) for a stream at its own rate, ``points/frame`` (frame numbers) for many rows or none a frame. Data sets
-without a clock were written once.
+`clock` names the data set with the frame or time of each row: ``radar/time`` for one row per frame, ``imu/time`` (s)
+    for
+a stream at its own rate, ``points/frame`` (frame numbers) for any number of rows per frame. Data sets without a clock
+are written once.
 """
 
 from radarize.io.recording.captured import spare

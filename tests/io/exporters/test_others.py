@@ -176,7 +176,7 @@ def test_a_sequence_of_roverd(recording, tmp_path):
         assert copy.config.tx_order == CONFIG.tx_order == (0, 2, 1)
         for name in ("slope", "idle_time", "adc_start_time", "ramp_end_time", "sample_rate", "frame_period"):
             assert getattr(copy.config, name) == getattr(CONFIG, name), name
-    with pytest.raises(InputError, match="is there already, expected the name of a new folder for the sequence"):
+    with pytest.raises(InputError, match="already exists, expected the name of a new folder for the sequence"):
         export(recording, "roverd", folder)
 
 

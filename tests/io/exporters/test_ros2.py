@@ -278,7 +278,7 @@ def test_parts_of_it(recording, run, tmp_path):
 def test_refusals(recording, run, tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "mine").touch()
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="already exists"):
         export(recording, "ros2", tmp_path / "there")
     with pytest.raises(InputError, match="expected a recording and a run"):
         export(run, "ros2", tmp_path / "x", run=run)

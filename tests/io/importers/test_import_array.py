@@ -136,7 +136,7 @@ def test_values_that_are_no_counts(tmp_path):
     loud = CUBE * 1000
     np.save(path, np.rint(loud))
     with Recording(import_recording(path, tmp_path / "a.h5", Given(config=CONFIG))) as recording:
-        assert "values lie outside of 16 bits" in recording.attributes["warnings"]
+        assert "values exceed 16 bits" in recording.attributes["warnings"]
     holed = CUBE.copy()
     holed[1, 2, 1, 0, 7] = np.nan
     holed[2, 0, 0] = 0
@@ -166,7 +166,7 @@ def test_memory_does_not_grow_with_the_array(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("values", "more", "message"),
     [
-        (CUBE[0], {}, "has shape .* expected shape to say"),
+        (CUBE[0], {}, "has shape .* expected the option shape to name"),
         (CUBE, {"shape": "frame,loop,tx,rx"}, "shape is 'frame,loop,tx,rx', expected names"),
         (CUBE, {"shape": "frame,loop,loop,rx,sample"}, "expected names of axes, each once"),
         (CUBE, {"shape": "frame,chirp,tx,rx,sample"}, "expected names of axes, each once"),

@@ -384,7 +384,7 @@ def test_refusals(tmp_path):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(InputError, match=f"{name}: is no readable ROS bag"):
             import_recording(tmp_path / name, tmp_path / "out.h5", Given(config=SMALL))
-    with pytest.raises(InputError, match="2 frames have not the 73728 words"):
+    with pytest.raises(InputError, match="2 frames do not have the 73728 words"):
         import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=CONFIG))
     with pytest.raises(InputError, match="stamps of its own, but start_time is 5"):
         import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=SMALL, start_time=5.0))

@@ -292,7 +292,7 @@ def quiet(count: int = 3) -> np.ndarray:
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        (lambda raw: (raw.astype(np.int32) + 2**15).astype("<u2").tobytes(), "--encoding offset-binary reads"),
+        (lambda raw: (raw.astype(np.int32) + 2**15).astype("<u2").tobytes(), "use --encoding offset-binary"),
         (lambda raw: raw.astype("<f8").tobytes(), r"floating-point numbers \(complex128\)"),
         (lambda raw: (raw / 7).astype("<f4").tobytes(), r"floating-point numbers \(complex64\)"),
         (lambda raw: raw.tobytes(), None),
@@ -322,4 +322,4 @@ def test_one_chirp_a_loop_is_told_where_it_is_assumed(tmp_path):
     for more, told in (({}, True), ({"tx": 1}, False)):
         given = Given(overrides=counts | more)
         with Recording(import_recording(tmp_path / "a.bin", tmp_path / "a.h5", given)) as recording:
-            assert ("all speeds would be doubled" in recording.attributes["warnings"]) == told
+            assert ("all speeds are doubled" in recording.attributes["warnings"]) == told

@@ -56,7 +56,7 @@ def test_each_capture_becomes_a_recording(tmp_path, case):
             told = recording.attributes["warnings"]
             assert "holds 2 captures" in told and f"this is capture {number}" in told
             assert f"capture 1 is in {tmp_path}/b.h5; capture 2 is in {tmp_path}/b-2.h5" in told
-    with pytest.raises(InputError, match="b-2.h5: is there already, and capture 2 of 2"):
+    with pytest.raises(InputError, match="b-2.h5: already exists, and capture 2 of 2"):
         import_recording(source, tmp_path / "b.h5", Given(CONFIG))
     for number, walk in enumerate(walks, 1):
         import_recording(source, tmp_path / "c.h5", Given(CONFIG, capture=number))

@@ -71,7 +71,7 @@ def test_what_lies_otherwise_is_noticed(tmp_path):
         for given in LAYOUTS:
             config = REAL if layout == "real" else CONFIG
             _, _, warnings = imported(tmp_path / "a.bin", data, Given(config, layout=given))
-            assert (f"--layout {layout} reads those" in warnings) == (layout != given), (layout, given, warnings)
+            assert (f"use --layout {layout}" in warnings) == (layout != given), (layout, given, warnings)
             assert "--layout" not in warnings or layout != given
 
 
@@ -80,7 +80,7 @@ def test_a_real_capture_is_told_from_itself_interleaved(recordings, tmp_path):
         frames, config = recording.adc(0, 1), recording.config
         assert "--layout" not in recording.attributes["warnings"]
     _, _, warnings = imported(tmp_path / "a.bin", interleaved(frames, config), Given(config))
-    assert "--layout interleaved reads those" in warnings
+    assert "use --layout interleaved" in warnings
 
 
 def test_only_raw_words_lie_somehow(tmp_path):

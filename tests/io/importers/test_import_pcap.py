@@ -74,7 +74,7 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path):
         assert len(recording) == 1
         assert recording.config.iq_order == "qqii"
         assert recording.valid(0, 1).all()
-        assert recording.attributes["warnings"].startswith("one chirp a loop is assumed")
+        assert recording.attributes["warnings"].startswith("a single chirp per loop, of TX1, is assumed")
         adc = recording.adc(0, 1)[0, :, 0, 0].astype(float)
     signal = adc[..., 0] + 1j * adc[..., 1]
     spectrum = np.fft.fft((signal - signal.mean(axis=1, keepdims=True)) * np.hanning(256), axis=1)

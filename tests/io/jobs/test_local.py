@@ -33,7 +33,7 @@ def test_a_job_is_begun_again_once(tmp_path):
     (tmp_path / "once").mkdir(), (tmp_path / "always").mkdir()
     found = ends(perform({"once": Fall(tmp_path / "once", 1), "always": Fall(tmp_path / "always", 9)}, workers=1))
     assert found["once"] == "stands"
-    assert found["always"].startswith("always: its process was killed, twice; most often memory is short")
+    assert found["always"].startswith("always: its process was killed twice; usually memory is short")
     assert len(list((tmp_path / "always").iterdir())) == 2
 
 

@@ -32,6 +32,6 @@ def spare(output: Path, anything: bool = False) -> None:
         if real:
             rescue = f" (radarize recover {path} makes a recording of it)" if path == part else ""
             raise InputError(
-                f"{path}: already exists and is a recording of a radar, which cannot be repeated{rescue}, expected another "
+                f"{path}: already exists, and a recording of a radar cannot be repeated{rescue}, expected another "
                 "name, or --overwrite of `capture` and `live`"
             )

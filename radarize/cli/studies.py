@@ -70,7 +70,7 @@ def train(
     with progress("train", "the same command with --resume continues after the last complete epoch") as report:
         written = train(
             task, data, output, hyper, TrainOptions(split, device, workers, resume, onnx, start),
-            progress=report, say=lambda line: typer.echo(line, err=True),
+            progress=report, log=lambda line: typer.echo(line, err=True),
         )  # fmt: skip
     print(written)
 

@@ -53,7 +53,7 @@ def train(
     options: TrainOptions | None = None,
     *,
     progress: Callable[..., None] = lambda *where: None,
-    say: Callable[[str], None] = lambda line: None,
+    log: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Train a network on recordings, alone or as one of the processes that `torchrun` started.
 
@@ -65,7 +65,7 @@ def train(
         settings: hyper-parameters; the task's own if None.
         options: how it is run.
         progress: called with (stage, done, in all).
-        say: takes a line for every epoch.
+        log: called with a line for every epoch.
 
     Raises:
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
@@ -77,7 +77,7 @@ def train(
     if before is not None:
         settings = replace(settings, width=before.width, frames=before.frames)
     _check(task, settings, output)
-    checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
+    checkpoint, log_file = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
     if checkpoint.exists() and not options.resume:
         raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
     network = task.network
@@ -86,22 +86,22 @@ def train(
         about |= {"start": options.start.name, "data": f"{before.data}, then {about['data']}"}
     with team(options.device) as crew:
         lead = crew.rank == 0
-        progress, say = (progress, say) if lead else (_nothing, _nothing)
+        progress, log = (progress, log) if lead else (_nothing, _nothing)
         parts = _read(task, data, options, settings.seed, progress, before.grid if before else None)
         trainer = Trainer(task, settings, *parts, crew)
         if begun is not None:
             trainer.net.load_state_dict(begun.state_dict())
         if options.resume and checkpoint.exists():
             trainer.restore(checkpoint, about)
-            say(f"resuming after epoch {len(trainer.history)}")
+            log(f"resuming after epoch {len(trainer.history)}")
         crew.wait()  # before the first one replaces what the others read
         while not trainer.finished:
             found = trainer.train_epoch(partial(progress, "training"))
             if lead:
                 trainer.save(checkpoint, about)
-                with replacing(log) as part:
+                with replacing(log_file) as part:
                     pd.DataFrame(trainer.history).to_csv(part, index=False)
-                say(_words(found))
+                log(_words(found))
         if lead:
             metrics = trainer.finish()
             header = task.header(
@@ -114,7 +114,7 @@ def train(
             if options.onnx:
                 export_onnx(trainer.net, header, output.with_suffix(".onnx"))
             checkpoint.unlink(missing_ok=True)
-            say("calibrated: " + _words(metrics))
+            log("calibrated: " + _words(metrics))
         crew.wait()
     return output
 

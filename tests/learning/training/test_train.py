@@ -137,16 +137,16 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
             settings=replace(TINY, seed=1),
             options=TrainOptions(resume=True),
         )
-    said = []
+    lines = []
     resumed = train(
         "translation",
         small,
         tmp_path / "part.safetensors",
         settings=TINY,
         options=TrainOptions(resume=True),
-        say=said.append,
+        log=lines.append,
     )
-    assert said[0] == "resuming after epoch 2"
+    assert lines[0] == "resuming after epoch 2"
     assert same(whole, resumed)
     assert header_of(whole).metrics == header_of(resumed).metrics
     assert not same(whole, train("translation", small, tmp_path / "c.safetensors", settings=replace(TINY, seed=1)))

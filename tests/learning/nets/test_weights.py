@@ -69,7 +69,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
     with pytest.raises(InputError, match="missing.safetensors: no such file"):
         load(tmp_path / "missing.safetensors", TranslationNet)
     (tmp_path / "text.safetensors").write_text("no weights at all")
-    with pytest.raises(InputError, match="text.safetensors: is no file of weights"):
+    with pytest.raises(InputError, match="text.safetensors: is not a file of weights"):
         load(tmp_path / "text.safetensors", TranslationNet)
     save_file({"a": torch.zeros(2)}, tmp_path / "other.safetensors")
     with pytest.raises(InputError, match="has no header of radarize"):
@@ -87,7 +87,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
         assert "expected one for 'translation' (corrected)" in str(refused.value)
     with torch.no_grad():
         net.resnet.head.bias[0] = 1e6
-    with pytest.raises(InputError, match="resnet.head.bias has values that float16 does not hold"):
+    with pytest.raises(InputError, match="resnet.head.bias has values outside the range of float16"):
         save(net, header, path)
 
 

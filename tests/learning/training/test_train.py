@@ -127,7 +127,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == -9, done.stderr
     assert sorted(path.name for path in tmp_path.glob("part.*")) == ["part.checkpoint", "part.csv"]
-    with pytest.raises(InputError, match="part.checkpoint: is left of a training that did not end; --resume goes on"):
+    with pytest.raises(InputError, match="part.checkpoint: belongs to an interrupted training; continue it with --resume"):
         train("translation", small, tmp_path / "part.safetensors", settings=TINY)
     with pytest.raises(InputError, match="is of a training with seed 0, expected 1"):
         train(
@@ -270,7 +270,7 @@ def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
 
     with h5py.File(good, "r+") as file:
         file["truth/velocity"][:] = np.nan
-    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or holds no numbers"):
+    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or has no numbers"):
         FeatureTable.read([good], ("doppler_azimuth",), (VELOCITY,))
 
 

@@ -78,7 +78,7 @@ def train(
 @app.command()
 def benchmark(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of a benchmark; list prints them, all runs all.")],
-    data: Annotated[Path | None, typer.Option(help="Folder of recordings, see `radarsim dataset`.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Folder of recordings, or of bags.")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder to write; finished parts in it are reused.")
     ] = None,

@@ -16,13 +16,14 @@ from radarize.cli import app
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.learning.features.grid import MapGrid, Resampling
-from radarize.learning.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
+from radarize.learning.features.occupancy import OCCUPANCY
 from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.weights import header_of, load, read
 from radarize.learning.task import find_task
 from radarize.learning.training.team import Team
 from radarize.learning.training.train import TrainOptions, train
+from radarize.signal.depthlabel import SURFACE, UNKNOWN
 from tests.learning.training.ridges import CONFIG, data_set, write
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -127,7 +128,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == -9, done.stderr
     assert sorted(path.name for path in tmp_path.glob("part.*")) == ["part.checkpoint", "part.csv"]
-    with pytest.raises(InputError, match="part.checkpoint: belongs to an interrupted training; continue it with --resume"):
+    with pytest.raises(InputError, match="part.checkpoint: belongs to an interrupted training; .* --resume"):
         train("translation", small, tmp_path / "part.safetensors", settings=TINY)
     with pytest.raises(InputError, match="is of a training with seed 0, expected 1"):
         train(

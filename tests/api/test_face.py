@@ -1,4 +1,4 @@
-"""`import radarize as rz`: what it offers, what that is called, and the examples of its docstrings."""
+"""`import radarize as rz`: its public names, their docstrings, and the examples in them."""
 
 import ast
 import doctest
@@ -21,19 +21,19 @@ PUBLIC["simulate"] = radarsim.simulate
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_examples(name, walk, rec, monkeypatch):
-    """Of every public function; a class may have its example where it is made."""
+    """Each public function has an example that runs; a class may have it where it is constructed."""
     monkeypatch.chdir(walk.parent)
     names = {"rz": rz, "radarsim": radarsim, "rec": rec}
     found = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=names)
     examples = [each for each in found if each.examples]
     assert examples or inspect.isclass(PUBLIC[name])
-    said: list[str] = []
+    output: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
-    assert not sum(runner.run(each, out=said.append).failed for each in examples), "".join(said)
+    assert not sum(runner.run(each, out=output.append).failed for each in examples), "".join(output)
 
 
 @pytest.mark.parametrize("name", [name for name, each in PUBLIC.items() if not inspect.isclass(each)])
-def test_docstrings_say_what_comes_out_and_what_goes_wrong(name):
+def test_docstrings_have_all_sections(name):
     text = inspect.getdoc(PUBLIC[name])
     assert all(f"\n{part}:\n" in text for part in ("Args", "Returns", "Raises", "Example"))
     signature = inspect.signature(PUBLIC[name])

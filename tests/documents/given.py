@@ -1,4 +1,4 @@
-"""Files that README and docs take as given: a capture, a map, a mesh, somebody's scans."""
+"""Files that README and docs assume: a capture, a map, a mesh, scans of another sensor."""
 
 import gzip
 import os
@@ -37,7 +37,7 @@ SECONDS, PLACE = 1.5 if ALL else 0.8, "stress/corner"  # RadarHD, of another pag
 
 def specification(name: str, path: Path) -> None:
     """A data set of the project, but short."""
-    assert name in DATASETS, f"data set {name} is none of DATASETS, which says how little of each is made"
+    assert name in DATASETS, f"data set {name} is none of DATASETS, which has the shortened size of each"
     folder = shipped() / "datasets"
     data, kept = yaml.safe_load((folder / f"{name}.yaml").read_text()), DATASETS[name]
     groups = {group["building"]: group for group in reversed(data["recordings"])}

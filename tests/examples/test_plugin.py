@@ -1,4 +1,4 @@
-"""A package of somebody else, installed by pip: its method and its format are there, and no file of ours knows them."""
+"""A third-party package, installed by pip: its method and its format are found without a change of our files."""
 
 import os
 import shutil

@@ -22,7 +22,7 @@ def test_reasons_of_libraries():
 
 
 def fails(error: Exception):
-    """A job that meets an error while it writes, and says so in its own words."""
+    """A job that raises an error while it writes, with a message of its own."""
 
     def job(report):
         with explained("x.h5: schade", type(error)):

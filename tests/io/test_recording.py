@@ -82,7 +82,7 @@ def messages(data: bytes, kind: int) -> list[int]:
 
 
 def test_other_software_can_read_it(tmp_path):
-    """HDF5 1.10 knows layouts to version 4 and types to 3; HDF5 2.0 writes newer ones, which older ones do not read."""
+    """HDF5 1.10 reads layouts up to version 4 and types up to 3; HDF5 2.0 writes newer ones, which it cannot read."""
     path = tmp_path / "a.h5"
     with RecordingWriter(path, CONFIG, products={"truth/floor_plan": Product(np.eye(4), "m", "walls")}) as writer:
         writer.append(frames(0, 3), np.arange(3.0))
@@ -304,7 +304,7 @@ def test_a_truncated_recording_is_refused(tmp_path, keep, state):
             writer.append(frames(i, i + 1), np.array([float(i)]))
         writer.flush()
         shutil.copyfile(writer.part, path)
-        os.truncate(path, writer._file.id.get_filesize())  # without what is claimed and not used
+        os.truncate(path, writer._file.id.get_filesize())  # without unused reserved bytes
     if state == "finished":
         shutil.copyfile(tmp_path / "a.h5", path)
     with Recording(path) as recording:

@@ -8,7 +8,7 @@ from radarize.io.stopwatch import Stopwatch, stage
 
 
 class Clock:
-    """Time that passes when it is told to."""
+    """A clock that the test advances."""
 
     def __init__(self, monkeypatch):
         self.now = 5.0

@@ -1,4 +1,4 @@
-"""All settings in one file: as printed they are the defaults, and what is wrong in one is said in a sentence."""
+"""All settings in one file: as printed they are the defaults, and an error in a file is reported in one sentence."""
 
 import pytest
 import yaml

@@ -158,7 +158,7 @@ def test_lost_bursts_and_frames_leave_a_gap(walk, unspoilt, lost, frames, tolera
 
 
 def test_everything_lost(walk, tmp_path):
-    """No crash, nothing seen, nothing moved; and a run of such a recording says so."""
+    """No crash, no scans, no motion; and a run of such a recording is an error."""
     results, pipeline, preprocessor = spoil(walk, np.zeros((40, 32, 3), bool))
     assert results == [] and preprocessor.lost == 40 and not pipeline.slam.nodes
     with Recording(walk) as source, RecordingWriter(tmp_path / "lost.h5", source.config) as writer:
@@ -244,7 +244,7 @@ def test_an_array_without_elevation(tmp_path):
 
 
 def test_a_configuration_changes_the_run(walk, finished, tmp_path):
-    """What is set is used, and told; what is not set is as always."""
+    """Given settings are used and stored; the others keep their defaults."""
     (tmp_path / "mine.yaml").write_text("slam:\n  grid:\n    map_resolution: 0.1\nscans:\n  min_range: 2.0\n")
     mine = Configuration.load(tmp_path / "mine.yaml")
     out = tmp_path / "run"
@@ -252,9 +252,9 @@ def test_a_configuration_changes_the_run(walk, finished, tmp_path):
     with pytest.raises(SystemExit) as ended:
         command(app, "radarize", ["run", str(walk), "-o", str(out), *methods, "--config", str(tmp_path / "mine.yaml")])
     assert ended.value.code == 0
-    told = json.loads((out / "run.json").read_text())["configuration"]
-    assert told == json.loads(mine.model_dump_json())
-    assert told["slam"]["grid"]["map_resolution"] == 0.1 and told["scans"]["min_range"] == 2.0
+    stored = json.loads((out / "run.json").read_text())["configuration"]
+    assert stored == json.loads(mine.model_dump_json())
+    assert stored["slam"]["grid"]["map_resolution"] == 0.1 and stored["scans"]["min_range"] == 2.0
     usual = json.loads((finished / "run.json").read_text())["configuration"]
     assert usual == json.loads(Configuration().model_dump_json()) and usual["slam"]["grid"]["map_resolution"] != 0.1
     assert "resolution: 0.1\n" in (out / "map.yaml").read_text()

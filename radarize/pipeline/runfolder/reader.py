@@ -62,6 +62,8 @@ FILES = (
     "metrics.json",
 )
 _NEEDED = ("time", "ranges", "azimuths")
+#: Key of ``run.json`` for the spans in which the motion was unobservable.
+_SPANS = "blind"
 #: Data sets with the times and coordinates of the others.
 _AXES = ("time", "azimuths", "truth/scan_azimuths", "heatmaps/ranges", "heatmaps/azimuths", "heatmaps/velocities")
 #: Factor by which a data set of ``scans.h5`` may be compressed, and bytes that may be missing. Ours are not compressed.
@@ -120,12 +122,12 @@ class RunFolder:
         Raises:
             InputError: the entry is malformed.
         """
-        if "blind" not in self.facts:
+        if _SPANS not in self.facts:
             return None
         try:
-            found = BlindSpans.model_validate(self.facts["blind"])
+            found = BlindSpans.model_validate(self.facts[_SPANS])
         except ValidationError as error:
-            raise InputError(f"{self.path / 'run.json'}: blind.{format_validation_error(error)}") from error
+            raise InputError(f"{self.path / 'run.json'}: {_SPANS}.{format_validation_error(error)}") from error
         start = float(self.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start

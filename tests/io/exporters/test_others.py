@@ -160,9 +160,9 @@ def test_a_sequence_of_roverd(recording, tmp_path):
     with Recording(recording) as source:
         assert np.array_equal(iqiq_from_iiqq(words), source.adc(0, COUNT))  # TX1, TX2, TX3
     assert np.fromfile(folder / "radar/valid", "u1").tolist() == [1, 1, 0, 1, 1, 1, 1]
-    told = json.loads((folder / "radar/radar.json").read_text())
-    assert told["range_resolution"] == pytest.approx(CONFIG.range_resolution)
-    assert told["doppler_resolution"] == pytest.approx(CONFIG.velocity_resolution)
+    resolutions = json.loads((folder / "radar/radar.json").read_text())
+    assert resolutions["range_resolution"] == pytest.approx(CONFIG.range_resolution)
+    assert resolutions["doppler_resolution"] == pytest.approx(CONFIG.velocity_resolution)
     chirps = yaml.safe_load((folder / "config.yaml").read_text())["radar"]["args"]["radar"]
     assert chirps["idle_time"] == 122.0 and chirps["freq_slope"] == 80.0 and chirps["device"] == "AWR1843"
     pose = np.load(folder / "_radar/pose.npz")

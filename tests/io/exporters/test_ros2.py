@@ -153,18 +153,19 @@ def test_odometry_and_its_transform(bag):
 
 
 def test_covariance_adds_up_as_in_a_simulation():
-    """Many walks whose steps err as their covariance says: positions spread as the bag claims."""
+    """Many walks with errors of the given covariance: the scatter of positions is that in the bag."""
     from radarize.io.exporters.ros2 import _odometry
     from radarize.pipeline.log import Log
 
     rng, error = np.random.default_rng(1), np.diag([0.01, 0.02, 0.01]) ** 2
     errors = ErrorModel.independent(np.tile(error, (COUNT, 1, 1)))
     log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), errors)
-    claimed = [message for _, topic, message in _odometry(log) if topic == "/odom"][-1].pose.covariance.reshape(6, 6)
+    *_, last = [message for _, topic, message in _odometry(log) if topic == "/odom"]
+    covariance = last.pose.covariance.reshape(6, 6)
     walks = np.zeros((20_000, 3))
     for _ in range(COUNT - 1):
         walks = compose(compose(walks, STEP), rng.multivariate_normal(np.zeros(3), error, len(walks)))
-    assert claimed[np.ix_([0, 1, 5], [0, 1, 5])] == pytest.approx(np.cov(walks.T), rel=0.1, abs=2e-4)
+    assert covariance[np.ix_([0, 1, 5], [0, 1, 5])] == pytest.approx(np.cov(walks.T), rel=0.1, abs=2e-4)
 
 
 def test_covariance_of_the_velocity_is_that_of_a_step():
@@ -175,8 +176,8 @@ def test_covariance_of_the_velocity_is_that_of_a_step():
     log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), ErrorModel.independent(np.tile(error, (COUNT, 1, 1))))
     twists = [message.twist for _, topic, message in _odometry(log) if topic == "/odom"]
     for twist in (twists[0], twists[7]):
-        claimed = twist.covariance.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
-        assert claimed == pytest.approx(error / CONFIG.frame_period**2, rel=0.02, abs=1e-4)
+        covariance = twist.covariance.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
+        assert covariance == pytest.approx(error / CONFIG.frame_period**2, rel=0.02, abs=1e-4)
         assert twist.twist.linear.x == pytest.approx(STEP[0] / CONFIG.frame_period, abs=1e-4)
 
 

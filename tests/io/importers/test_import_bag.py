@@ -132,7 +132,7 @@ def test_tracked_poses_are_brought_to_the_frames(original, imported, motion):
 
 def test_the_same_trajectory_comes_out(original, bag, imported, tmp_path):
     if bag.is_dir():
-        pytest.skip("the samples are the same, as another test says: one bag is enough")
+        pytest.skip("the samples are the same, as another test checks: one bag is sufficient")
     found = []
     for path in (original, imported):
         out = run(path, tmp_path / path.stem, odometry="doppler", scans="first-echo").path
@@ -194,7 +194,7 @@ def test_bags_without_definitions_are_read(tmp_path):
 
 
 def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
-    """Received 30 ms after their start. Nothing said: the burst's length, 1 ms, is the least."""
+    """Received 30 ms after their start. Without a given latency, the burst duration, 1 ms, is used."""
     times = 0.05 * np.arange(3)
     write(tmp_path / "a.bag", SMALL, times, latency=0.03)
     with BagWriter(tmp_path / "b.bag", 1) as bag:
@@ -254,16 +254,16 @@ def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
     with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         assert recording.times - EPOCH == pytest.approx(np.unique(times), abs=1e-6)
         assert "2 frames are missing" in recording.attributes["warnings"]
-        assert "1 frames came again" in recording.attributes["warnings"]
+        assert "1 frames are repeated" in recording.attributes["warnings"]
 
 
 def test_an_imu_is_read_on_the_radars_axes(tmp_path):
-    """As a tracking camera has it: in an optical frame. Where neither the frame's name nor the user says so, it is
-    no IMU on the radar's axes, for gravity is felt along another."""
+    """The IMU of a tracking camera has an optical frame. If neither the frame's name nor the user states this, it is
+    not on the radar's axes, since gravity is along another one."""
     force, turn = np.array([0.3, -0.2, 9.8]), np.array([0.1, 0.2, 0.5])
     optical = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])  # x right, y down, z ahead
     named, given = Given(config=SMALL), Given(config=SMALL, imu_turn=(-90.0, 0.0, -90.0))
-    for frame, told, known in (
+    for frame, options, known in (
         ("tracking_imu_optical_frame", named, True),
         ("imu", given, True),
         ("imu", named, False),
@@ -274,7 +274,7 @@ def test_an_imu_is_read_on_the_radars_axes(tmp_path):
                 for tick in 0.05 * k + 0.005 * np.arange(10):
                     bag.imu(tick, optical @ force, optical @ turn, frame)
         (tmp_path / "a.h5").unlink(missing_ok=True)
-        with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", told)) as recording:
+        with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", options)) as recording:
             assert ("imu/mount" in recording.attributes["assumed"]) == (not known)
             if known:
                 found = Imu.of(recording).samples
@@ -407,7 +407,7 @@ LAST = "where timestamp = (select max(timestamp) from messages)"
 
 
 @pytest.mark.parametrize(
-    ("change", "value", "said"),
+    ("change", "value", "message"),
     [
         (f"messages set timestamp = ? {LAST}", "noon", "/radar0/radar_data has no number for its time, 'noon'"),
         (f"messages set timestamp = ? {LAST}", b"noon", "/radar0/radar_data has no number for its time, b'noon'"),
@@ -417,7 +417,7 @@ LAST = "where timestamp = (select max(timestamp) from messages)"
         ("topics set type = ?", b"type", ""),
     ],
 )
-def test_values_of_any_type_are_refused(tmp_path, change, value, said):
+def test_values_of_any_type_are_refused(tmp_path, change, value, message):
     """SQLite keeps anything in any column."""
     with BagWriter(tmp_path / "a", 2) as bag:
         for k, frame in enumerate(noise(SMALL, 3)):
@@ -425,7 +425,7 @@ def test_values_of_any_type_are_refused(tmp_path, change, value, said):
     (path,) = (tmp_path / "a").glob("*.db3")
     with sqlite3.connect(path) as base:
         base.execute(f"update {change}", [value])
-    with pytest.raises(InputError, match=f"a.db3: .*{said}"):
+    with pytest.raises(InputError, match=f"a.db3: .*{message}"):
         import_recording(path, tmp_path / "out.h5", Given(config=SMALL))
     assert not (tmp_path / "out.h5").exists()
 

@@ -316,10 +316,10 @@ def test_offset_binary(tmp_path):
         import_recording(tmp_path / "a.npy", tmp_path / "b.h5", given)
 
 
-def test_one_chirp_a_loop_is_told_where_it_is_assumed(tmp_path):
+def test_an_assumed_single_chirp_per_loop_is_a_warning(tmp_path):
     (tmp_path / "a.bin").write_bytes(encode(quiet(), CONFIG).tobytes())
     counts = {"samples": CONFIG.samples, "loops": CONFIG.loops * 3, "rx": 4}
-    for more, told in (({}, True), ({"tx": 1}, False)):
+    for more, warned in (({}, True), ({"tx": 1}, False)):
         given = Given(overrides=counts | more)
         with Recording(import_recording(tmp_path / "a.bin", tmp_path / "a.h5", given)) as recording:
-            assert ("all speeds are doubled" in recording.attributes["warnings"]) == told
+            assert ("all speeds are doubled" in recording.attributes["warnings"]) == warned

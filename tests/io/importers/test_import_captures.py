@@ -53,9 +53,9 @@ def test_each_capture_becomes_a_recording(tmp_path, case):
     for name, walk, number in (("b.h5", walks[0], 1), ("b-2.h5", walks[1], 2)):
         with Recording(tmp_path / name) as recording:
             assert np.array_equal(recording.adc(0, 99), walk) and recording.valid(0, 99).all()
-            told = recording.attributes["warnings"]
-            assert "holds 2 captures" in told and f"this is capture {number}" in told
-            assert f"capture 1 is in {tmp_path}/b.h5; capture 2 is in {tmp_path}/b-2.h5" in told
+            warnings = recording.attributes["warnings"]
+            assert "holds 2 captures" in warnings and f"this is capture {number}" in warnings
+            assert f"capture 1 is in {tmp_path}/b.h5; capture 2 is in {tmp_path}/b-2.h5" in warnings
     with pytest.raises(InputError, match="b-2.h5: already exists, and capture 2 of 2"):
         import_recording(source, tmp_path / "b.h5", Given(CONFIG))
     for number, walk in enumerate(walks, 1):

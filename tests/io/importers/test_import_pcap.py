@@ -47,8 +47,8 @@ INTERFACE = struct.pack("<IIHHII", 1, 20, 1, 0, 0, 20)
 
 
 def pcapng(path: Path, data: list[bytes]) -> Path:
-    """Written field by field after the draft, so that the library that reads it is not asked about itself."""
-    blocks = [SECTION, INTERFACE, struct.pack("<III", 5, 12, 12)]  # and one that says nothing here
+    """Write a file field by field from the draft, independently of the library that reads it."""
+    blocks = [SECTION, INTERFACE, struct.pack("<III", 5, 12, 12)]  # and an irrelevant one
     for i, packet in enumerate(data):
         padded = packet + bytes(-len(packet) % 4)
         high, low = divmod(int((1000 + i + 0.5) * 1e6), 2**32)
@@ -81,7 +81,7 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path):
     power = (np.abs(spectrum) ** 2).mean(axis=0)
     peaks = [k for k in range(5, 250) if power[k] == power[k - 3 : k + 4].max()]
     assert sorted(peaks, key=lambda k: -power[k])[:2] == [59, 39]
-    # A static room: chirps are alike (README: correlation 0.998).
+    # A static room: chirps are equal (README: correlation 0.998).
     unit = signal / np.linalg.norm(signal, axis=1, keepdims=True)
     assert np.abs((unit[1:] * unit[:-1].conj()).sum(axis=1)).mean() == pytest.approx(0.998, abs=0.001)
 

@@ -1,4 +1,4 @@
-"""Augmentations: both signs of everything, and that they change no more than they say."""
+"""Augmentations: all signs occur, and nothing else changes."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_signs_of_all_tasks():
     found, turn = find_task("rotation").augment(maps, torch.tensor([[0.2, 0.3, 0.1]]).repeat(count, 1), generator)
     moved = found[:, 0, 0, 8].argmax(dim=1) - found[:, 1, 0, 8].argmax(dim=1)
     assert torch.equal(moved.sign(), turn[:, 0].sign().long()) and len(turn[:, 0].unique()) == 2
-    assert torch.allclose(turn[:, 1:].abs(), torch.tensor([0.3, 0.1]), atol=0.05)  # told with some doubt
+    assert torch.allclose(turn[:, 1:].abs(), torch.tensor([0.3, 0.1]), atol=0.05)  # given with some error
     assert torch.equal(turn[:, 2].sign(), turn[:, 0].sign())  # mirrored with the maps
 
     shown, label = walls(count, np.random.default_rng(0))

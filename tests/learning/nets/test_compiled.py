@@ -1,4 +1,4 @@
-"""Graphs that come with the package: that they say what the networks say, whatever the weights."""
+"""Graphs of the package: their output equals that of the networks, with any weights."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The networks: sizes by formula, what they are blind to, and their normal distributions."""
+"""The networks: sizes by formula, invariances, and normal distributions."""
 
 import numpy as np
 import pytest
@@ -112,8 +112,8 @@ def test_gain_does_not_matter(kind):
     torch.manual_seed(0)
     net = NETS[kind](2, ("a", "b"), 4).eval()
     maps = 10 * torch.randn(3, 2, 2, 32, 80)
-    told = (torch.zeros(3, 2),) if kind == "rotation" else ()
-    for a, b in zip(net.estimate(maps, *told), net.estimate(maps + 17, *told), strict=True):
+    travel = (torch.zeros(3, 2),) if kind == "rotation" else ()
+    for a, b in zip(net.estimate(maps, *travel), net.estimate(maps + 17, *travel), strict=True):
         assert torch.allclose(a, b, atol=1e-4)
 
 

@@ -26,7 +26,7 @@ MAPS = {"translation": ("doppler_azimuth", "doppler_elevation_aware"), "rotation
 
 
 def network(kind: str, width: int = 4):
-    """One with weights and statistics that say something."""
+    """A network with weights and statistics that affect its output."""
     maps = MAPS.get(kind, ("range_azimuth", "elevation_aware"))
     header = Header(
         kind=kind, frames=2, maps=maps, width=width, grid=MapGrid.of(CONFIG, maps[0]), data="small", seed=3,
@@ -119,5 +119,5 @@ for network in (TranslationNet, RotationNet):
     load(Weights().of(network.kind), network)
 print("torch" in sys.modules, "torch._dynamo" in sys.modules)
 """
-    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-    assert said.split() == ["True", "False"]
+    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert output.split() == ["True", "False"]

@@ -89,21 +89,21 @@ def test_networks_learn(kind, tmp_path):
 
 
 def test_uncertainty_follows_what_is_seen(tmp_path):
-    """Of maps that show nothing but noise, the network claims what is known without them."""
-    for k in range(4):  # mostly blank: one factor calibrates all claims
+    """For maps with noise only, the network estimates the covariance of the labels."""
+    for k in range(4):  # mostly blank: one factor calibrates all covariances
         write(tmp_path / "data" / f"{k}.h5", "velocity", 100, k, blank=0.6)
     settings = replace(QUICK["translation"], epochs=12)
     weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
     net, header = load(weights, TASKS["translation"].network)
-    claimed = []
+    deviations = []
     for blank in (0, 1):
         path = write(tmp_path / f"{blank}.h5", "velocity", 100, 9, blank)
         table = FeatureTable.read([path], header.maps, (VELOCITY,))
         with torch.no_grad():
             covariance = net.estimate(table.window(table.starts(1)[:, None]))[1]
-        claimed.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
-    assert (claimed[1] > 1.3 * claimed[0]).all()
-    assert claimed[1] == pytest.approx([1.2 / 3**0.5, 0.8 / 3**0.5], rel=0.4)  # of uniform distributions
+        deviations.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
+    assert (deviations[1] > 1.3 * deviations[0]).all()
+    assert deviations[1] == pytest.approx([1.2 / 3**0.5, 0.8 / 3**0.5], rel=0.4)  # of uniform distributions
 
 
 def same(a: Path, b: Path) -> bool:
@@ -192,9 +192,9 @@ def test_it_ends_when_it_gets_no_better(small, tmp_path, monkeypatch):
     assert header_of(weights).epochs == 3
 
 
-def test_a_loss_that_is_no_number_is_said(small, tmp_path, monkeypatch):
-    honest = losses.likelihood
-    monkeypatch.setattr(losses, "likelihood", lambda found, truth: honest(found, truth) * float("nan"))
+def test_a_loss_that_is_not_finite_is_an_error(small, tmp_path, monkeypatch):
+    finite = losses.likelihood
+    monkeypatch.setattr(losses, "likelihood", lambda found, truth: finite(found, truth) * float("nan"))
     with pytest.raises(InputError, match="the loss is nan in epoch 1, step 1: it diverged, expected a smaller --rate"):
         train("translation", small, tmp_path / "net.safetensors", settings=TINY)
 
@@ -276,7 +276,7 @@ def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
 
 
 def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
-    """As where a tracking camera was blind, or an IMU stalled."""
+    """As when a tracking camera loses tracking, or an IMU stalls."""
     import h5py
 
     paths = [write(tmp_path / name, "velocity", 8) for name in ("a.h5", "b.h5")]

@@ -83,7 +83,7 @@ def test_motion_tells_shifts_tilt_and_scale(seed):
 
 
 def test_an_array_without_elevation():
-    """Two transmitters: a row of eight; nothing is said of heights."""
+    """Two transmitters: a row of eight, which does not determine elevations."""
     flat = PRESETS["two-tx"]
     array = Array(flat)
     assert array.axes == [0]

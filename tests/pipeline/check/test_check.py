@@ -81,7 +81,7 @@ def test_each_kind_is_put_in_somewhere():
     assert kinds - {fault.kind for fault in FAULTS.values()} <= {"transmitter copied"}
 
 
-def test_a_finding_says_what_was_measured_and_what_mends_it(whole):
+def test_a_finding_has_measurement_and_remedy(whole):
     (found,) = check_evidence(harmed(whole, exchanged_iq).evidence).findings
     assert found.sure > 0.9 and "dB stronger" in found.measured and "--iq-order iiqq" in found.remedy
 
@@ -167,9 +167,9 @@ def test_the_command(path, whole, tmp_path, capsys):
     assert "no fault found" in capsys.readouterr().out
     wrong = write(harmed(whole, transmitters(0, 2, 1)), tmp_path / "wrong.h5")
     assert called("check", wrong, "--json", "--fix", tmp_path / "right.h5") == 1
-    told = json.loads(capsys.readouterr().out)
-    assert [each["kind"] for each in told["findings"]] == ["transmitter order"] and not told["well"]
-    assert "azimuth mirrored" in told["not_observable"]
+    printed = json.loads(capsys.readouterr().out)
+    assert [each["kind"] for each in printed["findings"]] == ["transmitter order"] and not printed["well"]
+    assert "azimuth mirrored" in printed["not_observable"]
     assert called("check", tmp_path / "right.h5") == 0
     assert called("check", tmp_path / "missing.h5") == 2
 
@@ -178,8 +178,8 @@ def test_run_warns_and_does_not_change(whole, tmp_path, capsys):
     part = whole.of(np.arange(60, 120))
     wrong = write(harmed(part, exchanged_iq), tmp_path / "wrong.h5")
     assert called("run", wrong, "-o", tmp_path / "run", "--odometry", "doppler", "--scans", "first-echo") == 0
-    told = capsys.readouterr().err
-    assert told.count("I and Q: leakage at negative range") == 1
+    printed = capsys.readouterr().err
+    assert printed.count("I and Q: leakage at negative range") == 1
     assert any("I and Q" in words for words in rz.Run(tmp_path / "run").warnings)
     with Recording(wrong) as recording:
         assert warnings_before(recording[::2]) == warnings_before(recording[:])

@@ -84,7 +84,7 @@ def import_(
         Literal["pairs", "interleaved", "real"],
         typer.Option(
             metavar="LAYOUT",
-            help="Order of .bin words: pairs (I and Q), interleaved (receivers alternate, four lanes), or real.",
+            help="Order of .bin words: pairs (I and Q), interleaved (receivers alternate, 4 lanes), or real samples.",
         ),
     ] = "pairs",
     board: Annotated[str | None, typer.Option(help="Name of the board (iwr1843boost, ...) or its YAML file.")] = None,

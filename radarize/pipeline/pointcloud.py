@@ -36,7 +36,7 @@ class PointCloud:
 
     @property
     def xyz(self) -> Float[np.ndarray, "point 3"]:
-        """(point, 3) Positions (point, 3): x forward, y left, z up, m."""
+        """Positions (point, 3): x forward, y left, z up, m."""
         return self.points[:, :3]
 
     @property

@@ -132,7 +132,7 @@ def test_every_second_frame(spoiled):
 
 
 def test_another_output_is_refused(found, tmp_path):
-    with pytest.raises(InputError, match="expected a board's file"):
+    with pytest.raises(InputError, match="expected a board file"):
         found.save(tmp_path / "board.txt")
 
 

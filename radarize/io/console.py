@@ -38,7 +38,7 @@ def new_app(about: str) -> typer.Typer:
             bool, typer.Option("--allow-outside", help="Let scenes, maps and data sets name files in other folders.")
         ] = False,
     ) -> None:
-        del debug, allow_outside  # read from the arguments by `run`, so that they may stand anywhere
+        del debug, allow_outside  # taken from the arguments by `run`, so that they work in any place
 
     return app
 

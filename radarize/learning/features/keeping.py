@@ -12,7 +12,7 @@ _BATCH = 32
 
 
 def keep_maps(source: Path, output: Path) -> Path:
-    """Convert a recording, simulated or real, to one with heat maps instead of samples, about a tenth of the size.
+    """Convert a recording, simulated or real, to one with heat maps instead of samples, about 37 % of the size.
 
     Truth and other streams are kept, except I/Q by path type.
 

@@ -12,7 +12,7 @@ class Losses:
     Args:
         period: frame period, s.
 
-        Attributes:
+    Attributes:
         frames, chirps: total numbers.
         lost_chirps: number of chirps with lost samples.
         hit_frames, lost_frames: number of frames with some such chirps, and with only such chirps.

@@ -39,7 +39,7 @@ class Evidence:
         imu: IMU, if there is one.
         numbers: numbers of the frames in the recording; from 0 if None.
 
-        Attributes:
+    Attributes:
         places: number of places at which frames are examined.
     """
 

@@ -93,7 +93,7 @@ def reason_not_to(command: Command) -> str | None:
 
 
 class Reader:
-    """Somebody who types commands in a folder.
+    """A reader who types commands in a folder.
 
     Args:
         folder: where.
@@ -194,7 +194,7 @@ def read(page: str, folder: Path, caches: Path | None) -> list[str]:
 
 @pytest.fixture(scope="module")
 def failures(tmp_path_factory) -> dict[str, list[str]]:
-    """By page typed, begun in an empty folder; of all pages with no compiled kernel."""
+    """Commands of each page, in an empty folder; with DOCUMENTS set, of all pages and without compiled kernels."""
     folder = tmp_path_factory.mktemp("documents")
     caches, first = folder / "caches" if ALL else None, folder / "first"
     first.mkdir()

@@ -1,4 +1,4 @@
-"""Time by stage: of whichever stopwatch runs, and without what other stages within took."""
+"""Time by stage of the running stopwatch, without the time of nested stages."""
 
 import time
 

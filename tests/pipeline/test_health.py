@@ -32,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 def result(start=1.7e9, fast=(), empty=(), no_turn=(), hit=(), dead=(), rx=0):
-    """A walk of 1 m/s in a furnished room, with frames in which it is another."""
+    """A walk at 1 m/s in a furnished room, with frames in which a condition differs."""
     frames = np.arange(COUNT)
     velocity = np.tile([1.0, 0.0], (COUNT, 1))
     velocity[list(fast)] = [0.0, -1.8]

@@ -163,7 +163,7 @@ def write(path: Path, config: RadarConfig, times, **more) -> Path:
 
 
 def test_calibration_and_sizes_come_from_the_frames(tmp_path):
-    """Virtual antenna of TX2, RX3 gets its own factor, whatever order transmitters fire in."""
+    """The virtual antenna of TX2 and RX3 gets its own factor in any firing order."""
     factors = np.random.default_rng(1).normal(size=(12, 2)).astype(np.float32).round(3)
     config = SMALL.model_copy(update={"range_bias": 0.07})
     write(tmp_path / "a.bag", config, 0.05 * np.arange(3), calibration=factors)
@@ -177,7 +177,7 @@ def test_calibration_and_sizes_come_from_the_frames(tmp_path):
 
 
 def test_bags_without_definitions_are_read(tmp_path):
-    """Of ROS 2 Humble and before: the frame's message is xwr_raw_ros's own."""
+    """In bags of ROS 2 Humble and before, the frame's message is that of xwr_raw_ros."""
     config = SMALL.model_copy(update={"range_bias": 0.0625})
     with BagWriter(tmp_path / "a", 2, published=True) as bag:
         for k, frame in enumerate(noise(config, 3)):
@@ -216,7 +216,7 @@ def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
 
 
 def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path):
-    """Receipts are late by 4 ms in the mean, once by 0.4 s; clocks differ by 80 ppm; three frames are missing."""
+    """Receipts are delayed by 4 ms on average, once by 0.4 s; clocks differ by 80 ppm; three frames are missing."""
     rng = np.random.default_rng(3)
     starts = SMALL.frame_period * (1 + 80e-6) * np.delete(np.arange(600), [100, 101, 300])
     received = starts + SMALL.burst_time + rng.exponential(4e-3, len(starts))
@@ -234,7 +234,7 @@ def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path)
 
 @pytest.mark.parametrize("jump", [0.2, 1.0, 3600.0])
 def test_a_header_ahead_of_its_receipt_is_not_believed(tmp_path, jump):
-    """The others are kept, also where headers go on by half a second after a pause."""
+    """The other headers are kept, also when they advance by half a second after a pause."""
     times = SMALL.frame_period * np.arange(60)
     times[40:] += 0.5
     stamps = times.copy()
@@ -303,7 +303,7 @@ def test_poses_are_unknown_where_tracking_was_lost(tmp_path):
 
 
 def test_a_silent_radar_does_not_keep_the_others_waiting(tmp_path):
-    """Ten seconds without frames: messages are forgotten, and the frames after it still get their poses."""
+    """After ten seconds without frames, earlier messages are dropped, and the next frames still get their poses."""
     with BagWriter(tmp_path / "a.bag", 1) as bag:
         frames = noise(SMALL, 20)
         for k in range(1200):
@@ -329,7 +329,7 @@ def test_damaged_depth_pictures_are_counted(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_bag(tmp_path, monkeypatch):
-    """Four times the messages, a quarter more memory at most."""
+    """Four times as many messages need at most a quarter more memory."""
     monkeypatch.setattr("radarize.io.importers.capture.BATCH_BYTES", 16 * SMALL.frame_bytes)
     peaks = []
     for seconds in (10, 40):
@@ -357,7 +357,7 @@ def test_a_bag_without_raw_samples_is_refused(recordings, tmp_path):
 
 
 def test_point_clouds_of_a_real_bag(recordings):
-    """Clouds of TI's ROS driver: in front of the radar, and closing when the sensor moves forward."""
+    """Clouds of TI's ROS driver are in front of the radar, and close when the sensor moves forward."""
     from radarize.io.importers.companions import cloud_columns
     from radarize.io.importers.rosbag import Bag
 
@@ -418,7 +418,7 @@ LAST = "where timestamp = (select max(timestamp) from messages)"
     ],
 )
 def test_values_of_any_type_are_refused(tmp_path, change, value, message):
-    """SQLite keeps anything in any column."""
+    """SQLite accepts values of any type in any column."""
     with BagWriter(tmp_path / "a", 2) as bag:
         for k, frame in enumerate(noise(SMALL, 3)):
             bag.frame(0.05 * k, frame, SMALL)

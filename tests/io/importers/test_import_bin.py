@@ -256,7 +256,7 @@ def test_bad_poses_are_refused_before_anything_is_written(tmp_path, text, messag
 # --- parts -----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("part", [0, 1, 2])
 def test_parts_of_a_capture_are_joined(tmp_path, part):
-    """Cut within a word; eleven of them, so that 10 does not come after 1."""
+    """Eleven parts, cut within a word; the number 10 sorts after 9."""
     frames = room(CONFIG, 6)
     data = encode(frames, CONFIG).tobytes()
     cuts = np.linspace(0, len(data), 12).astype(int) | 1
@@ -285,7 +285,7 @@ def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
 
 
 def quiet(count: int = 3) -> np.ndarray:
-    """Frames as real ones are: far from full scale."""
+    """Frames with the level of real ones, far below full scale."""
     return np.random.default_rng(1).normal(0, 200, (count, *CONFIG.frame_shape)).astype(np.int16)
 
 

@@ -1,4 +1,4 @@
-"""Captures of other boards: which one is assumed, and real samples."""
+"""Captures of other boards: assumed boards, and real samples."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Network captures with more than one capture of a radar, and with packets that are not whole."""
+"""Network captures with several captures of a radar, and with incomplete packets."""
 
 import socket
 import struct
@@ -81,7 +81,7 @@ def test_from_python_and_the_command_line(tmp_path):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_bad_network_starts_no_radar(tmp_path, seed):
-    """Lost, repeated, late and forged packets, and a gap of half a walk."""
+    """Two starts with lost, repeated, late and forged packets, and a gap of half a walk."""
     rng, data = np.random.default_rng(seed), sent(np.concatenate([*WALKS] * 10))
     kept = [packet for packet in data if rng.random() > 0.05]
     for place in rng.integers(0, len(kept) - 80, 40):

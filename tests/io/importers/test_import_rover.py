@@ -1,4 +1,4 @@
-"""Sequences in roverd's layout: words, stamps, lost packets and poses against another reader, and what is off."""
+"""Sequences in roverd's layout: words, stamps, lost packets and poses against another reader; damaged sequences."""
 
 import json
 
@@ -19,7 +19,7 @@ def sequence(tmp_path):
 
 
 def test_samples_are_those_that_another_reader_sees(sequence, tmp_path):
-    """Against the reader of the rig's own authors, whose package the layout comes with."""
+    """Import compared with the reader of the rig's authors."""
     with Recording(import_recording(sequence, tmp_path / "a.h5", Given())) as recording:
         words = np.fromfile(sequence / "radar/iq", "<i2").reshape(FRAMES, RADAR.loops, 3, 4, -1)
         assert np.array_equal(recording.adc(0, FRAMES), iqiq_from_iiqq(words))

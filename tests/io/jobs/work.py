@@ -1,4 +1,4 @@
-"""Jobs that tests give to other processes."""
+"""Jobs for tests of parallel execution."""
 
 import os
 import signal
@@ -74,7 +74,7 @@ def _warm(count):
 
 @dataclass(frozen=True)
 class Threads:
-    """How many threads of each library there really are.
+    """Number of running threads of each library.
 
     Attributes:
         early: what the job needs was loaded before it came.

@@ -42,7 +42,7 @@ def test_labels_follow_their_maps():
 
 
 def test_signs_of_all_tasks():
-    """Whatever is drawn, the maps that come out are those of the label that comes out."""
+    """Augmented maps fit the augmented label, for any random numbers."""
     generator = torch.Generator().manual_seed(0)
     count = 64
     maps = items(ridge(np.repeat(VELOCITY, count, axis=0))).repeat(1, 1, 2, 1, 1)
@@ -85,7 +85,7 @@ def test_signs_of_all_tasks():
     ],
 )
 def test_effects_are_of_their_size(effect, least, most):
-    """dB; peaks move little, and what adds power never takes any away."""
+    """Effects on dB: peaks move little, and added power never reduces a cell."""
     maps = items(np.repeat(ridge(VELOCITY), 50, axis=0)).repeat(1, 2, 1, 1, 1)
 
     def change(where: bool) -> torch.Tensor:

@@ -13,7 +13,7 @@ from radarize.pipeline.method import Weights
 
 
 def altered(kind: str) -> tuple[nn.Module, Header]:
-    """The shipped network with weights and statistics that it never had."""
+    """The shipped network with random weights and statistics."""
     net, header = load(Weights().of(kind), find_task(kind).network)
     torch.manual_seed(1)
     for values in net.state_dict().values():

@@ -1,4 +1,4 @@
-"""Files of weights: what comes back, what is refused, and ONNX."""
+"""Files of weights: reading back, refused files, and ONNX."""
 
 import json
 import re
@@ -93,7 +93,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
 
 @pytest.mark.parametrize("kind", NETS)
 def test_onnx_says_the_same(kind, tmp_path):
-    """By another run time, for any number of items."""
+    """Compared with another runtime, for any number of items."""
     pytest.importorskip("onnxscript", reason="the extra onnx is not installed")
     net, header = network(kind)
     path = export_onnx(net, header, tmp_path / "net.onnx")
@@ -109,7 +109,7 @@ def test_onnx_says_the_same(kind, tmp_path):
 
 
 def test_loading_imports_no_compiler():
-    """Nobody waits seconds for what torch imports to compile networks, or to draw numbers for the device "meta"."""
+    """Loading networks does not import torch's compiler, which takes seconds."""
     script = """
 import sys
 from radarize.pipeline.method import Weights

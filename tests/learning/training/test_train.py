@@ -1,4 +1,4 @@
-"""Training: that networks learn the laws their maps are drawn by, and what interrupts, teams and bad input do to it."""
+"""Training: networks learn the laws of synthetic maps; interrupts, several processes, and bad input."""
 
 import csv
 import os
@@ -113,7 +113,7 @@ def same(a: Path, b: Path) -> bool:
 
 
 def test_resumed_is_uninterrupted(small, tmp_path):
-    """Killed without warning after two epochs and a bit, then started anew with --resume."""
+    """Killed during the third epoch, then restarted with --resume."""
     whole = train("translation", small, tmp_path / "whole.safetensors", settings=TINY)
     code = f"""
 import os, torch
@@ -154,7 +154,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
 
 
 def test_two_processes(small, tmp_path):
-    """By torch's launcher: both end with the same weights, and the loss falls."""
+    """Two processes of torch's launcher end with the same weights, and the loss falls."""
     code = f"""
 import hashlib, os
 from dataclasses import replace
@@ -301,7 +301,7 @@ OTHER = CONFIG.model_copy(update={"loops": 24, "samples": 32})
 
 
 def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
-    """As networks are shown them; frames of the radar that has the grid stay as they are."""
+    """Maps are resampled as in operation; those of a radar with the network's grid are unchanged."""
     paths = [write(tmp_path / "a.h5", "velocity", 5), write(tmp_path / "b.h5", "velocity", 6, config=OTHER)]
     grid = MapGrid.of(CONFIG, "doppler_azimuth")
     table = FeatureTable.read(paths, ("doppler_azimuth",), (VELOCITY,), grid=grid)
@@ -314,7 +314,7 @@ def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
 
 
 def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
-    """What the first has learned, the second goes on with: with no time to learn, it is as good."""
+    """A training continues from the weights of another: without further steps it is equally good."""
     first = train("translation", small, tmp_path / "first.safetensors", QUICK["translation"])
     mixed = tmp_path / "mixed"
     mixed.mkdir()

@@ -101,7 +101,7 @@ def test_a_standing_radar_is_not_judged_by_its_motion(whole):
     ],
 )  # fmt: skip
 def test_fix_gives_the_samples_back(whole, harm, tmp_path):
-    """Byte by byte, with configuration and stamps; and nothing is found in what was corrected."""
+    """Samples, configuration and stamps are restored byte by byte, and the corrected recording has no finding."""
     source = write(harmed(whole, harm), tmp_path / "wrong.h5")
     assert not check(source, tmp_path / "right.h5").well
     with Recording(tmp_path / "right.h5") as right:
@@ -122,7 +122,7 @@ def test_repeated_frames_are_left_out(whole, tmp_path):
 
 
 def test_streams_come_along(path, whole, tmp_path):
-    """An IMU as it was, and poses; rows of frames with their frames."""
+    """IMU and poses are unchanged; rows of frames move with their frames."""
     with Recording(path) as source:
         correction = Correction(order=np.arange(len(source))[::-1], keeps_stamps=True)
         write_corrected(source[:], (Finding("x", "y", 1.0, "z", correction),), tmp_path / "right.h5")
@@ -137,7 +137,7 @@ def test_streams_come_along(path, whole, tmp_path):
 
 
 def test_the_right_board_is_written(whole, tmp_path):
-    """Left and right exchanged in a board's file, as an IMU sees: the corrected file has them the right way."""
+    """Left and right are exchanged in a board file, which an IMU shows; the corrected file has them in order."""
     from radarize.pipeline.check.correction import _write_board
 
     wrong = harmed(whole, mirrored)
@@ -213,7 +213,7 @@ def test_lost_frames_are_no_frozen_ones(whole):
 
 
 def test_public_captures(recordings, tmp_path):
-    """One frame each, of radars at rest: that the radar stands is all that may be found."""
+    """One frame each, of radars at rest: the only finding allowed is that the radar does not move."""
     from tests.io.importers.public import captures
 
     for capture in captures(recordings, tmp_path).values():

@@ -1,4 +1,4 @@
-"""Run folders: whole or not at all, and the same when read."""
+"""Run folders: complete or absent, and read back as written."""
 
 import gc
 import json
@@ -22,7 +22,7 @@ RNG, RADAR = np.random.default_rng(0), PRESETS["radarize"]
 
 
 def result(first, count):
-    """Frames of a walk ahead, 30 a second; nothing is seen of every other."""
+    """Frames of forward motion at 30 Hz; every second one has no echo."""
     frames = first + np.arange(count)
     step = np.tile([0.02, 0.0, 0.01], (count, 1))
     track = SimpleNamespace(

@@ -43,11 +43,11 @@ class Health:
         radar: configuration of the frames that are used; the advice states its limits.
 
     Attributes:
-        blindness: spans in which odometry could not observe the motion.
+        observability: spans in which odometry could not observe the motion.
     """
 
     def __init__(self, radar: RadarConfig):
-        self.radar, self.blindness, self._fastest = radar, Blindness(radar.frame_period), Aliases(radar).fastest
+        self.radar, self.observability, self._fastest = radar, Blindness(radar.frame_period), Aliases(radar).fastest
         self._spans: dict[tuple[str, str], Spans] = {}  # by kind and advice
         self._first = self._last = np.nan
         self._aliased, self._far = ("aliased", self._too_fast()), ("out of reach", self._out_of_reach())
@@ -55,7 +55,7 @@ class Health:
     def add(self, result: Result) -> None:
         """Process the result of the next batch."""
         track = result.track
-        self.blindness.add(track)
+        self.observability.add(track)
         if not len(track.time):
             return
         if np.isnan(self._last):
@@ -90,7 +90,7 @@ class Health:
                 kind="unobservable", start_s=span.start_s, stop_s=span.stop_s,
                 advice="; ".join(_UNOBSERVABLE[cause] for cause in span.why.split(" and ")),
             )
-            for span in self.blindness.found.spans
+            for span in self.observability.found.spans
         ]  # fmt: skip
         others = [
             Condition(kind=kind, start_s=span.start_s, stop_s=span.stop_s, advice=advice)
@@ -101,7 +101,7 @@ class Health:
 
     def warnings(self) -> list[str]:
         """Return a sentence on each kind, with times since the first frame, and on a speed limit below walking pace."""
-        warnings = self.blindness.warnings()
+        warnings = self.observability.warnings()
         if self._fastest < WALKING_PACE:
             warnings.append(self._slow())
         for (kind, advice), spans in self._spans.items():

@@ -117,15 +117,15 @@ class RunWriter:
         times, period, name = self._scans["time"], recording.config.frame_period, recording.path.name
         attributes = {k: v for k, v in recording.attributes.items() if isinstance(v, str | int | float)}
         centers = recording.times[[span.start, span.stop - 1]] + recording.config.burst_center
-        blindness = self.health.blindness
-        blindness.lost(float(centers[0]), float(times[0]))
-        blindness.lost(float(times[-1]), float(centers[1]))
+        observability = self.health.observability
+        observability.lost(float(centers[0]), float(times[0]))
+        observability.lost(float(times[-1]), float(centers[1]))
         self._facts |= {
             "recording": name,
             "recording_attributes": attributes,
             "frames": len(span),
             "duration_s": float(times[-1] - times[0] + period),
-            "blind": blindness.found.model_dump(),
+            "blind": observability.found.model_dump(),
             "health": [each.model_dump() for each in self.health.found],
             "warnings": [*recording.damage, *warnings, *self.health.warnings()],
             "radar": recording.config.model_dump(mode="json"),

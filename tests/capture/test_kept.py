@@ -173,7 +173,7 @@ def killed(path, frames=25):
 def test_recover(tmp_path):
     part = killed(tmp_path / "a.h5")
     done = CliRunner().invoke(app, ["recover", str(part)])
-    assert done.exit_code == 0 and "a.h5: 25 frames" in done.stdout and "a.h5.part: what wrote it ended" in done.stderr
+    assert done.exit_code == 0 and "a.h5: 25 frames" in done.stdout and "which was interrupted" in done.stderr
     assert os.listdir(tmp_path) == ["a.h5"]
     with Recording(tmp_path / "a.h5") as recording:
         assert np.array_equal(recording.adc(0, 99), ADC[:25]) and recording.cfg_text == "% mine"
@@ -189,9 +189,9 @@ def test_what_cannot_be_recovered(tmp_path):
         recover(tmp_path / "a.h5")
     part = killed(tmp_path / "b.h5")
     (tmp_path / "b.h5").write_bytes(b"")
-    with pytest.raises(InputError, match="b.h5: is there already"):
+    with pytest.raises(InputError, match="b.h5: already exists"):
         recover(part)
-    with pytest.raises(InputError, match="a.h5: is there already"):
+    with pytest.raises(InputError, match="a.h5: already exists"):
         recover(part, tmp_path / "a.h5")
     with RecordingWriter(tmp_path / "c.h5", SMALL) as writer:
         writer.append(ADC[:3], np.arange(3.0))
@@ -214,9 +214,9 @@ def test_what_was_captured_is_not_replaced_unasked(tmp_path):
     before = (tmp_path / "a.h5").read_bytes()
     left = killed(tmp_path / "b.h5")
     for path, hint in ((tmp_path / "a.h5", "expected another name"), (tmp_path / "b.h5", "radarize recover")):
-        with pytest.raises(InputError, match=f"{path.name}.*is there already.*{hint}"):
+        with pytest.raises(InputError, match=f"{path.name}.*already exists.*{hint}"):
             captured(path, Played(frames=4))
-        with pytest.raises(InputError, match="is there already"):  # by a simulation, say
+        with pytest.raises(InputError, match="already exists"):  # by a simulation, say
             RecordingWriter(path, SMALL)
     assert (tmp_path / "a.h5").read_bytes() == before and left.exists()
     captured(tmp_path / "a.h5", Played(frames=4), overwrite=True)

@@ -53,7 +53,7 @@ def test_failures_do_not_stop_the_others(undisturbed, tmp_path):
     assert sorted(outcome.made) == ["c", "d"]
     assert outcome.failed["a"] == "a: no room to move"
     assert outcome.failed["b"] == "b: internal error, ZeroDivisionError: odd"
-    assert outcome.failed["x"].startswith("x: its process was killed, twice")
+    assert outcome.failed["x"].startswith("x: its process was killed twice")
     assert "failed: a: no room to move" in lines
     assert made(tmp_path) == {name: undisturbed[name] for name in ("c.h5", "d.h5")}
 

@@ -39,7 +39,7 @@ def use_run(folder: Path) -> None:
     """Read all of a run."""
     Log.read(folder)
     run = RunFolder(folder)
-    _ = run.blind
+    _ = run.unobservable_spans
     for part in ("facts", "methods", "metrics", "trajectory", "odometry", "reference", "map"):
         getattr(run, part)
     if run.map is not None:

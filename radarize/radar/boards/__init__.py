@@ -17,7 +17,7 @@ from jaxtyping import Int
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from radarize.io.errors import InputError
-from radarize.io.plain import Frozen, complaint
+from radarize.io.plain import Frozen, format_validation_error
 from radarize.io.yamlfile import read_yaml
 from radarize.radar.boards.chips import CHIPS
 
@@ -176,7 +176,7 @@ def load_board(board: str | Path | Board) -> Board:
     try:
         return Board.model_validate({"name": Path(board).stem, **data})
     except ValidationError as error:
-        raise InputError(f"{board}: {complaint(error)}") from error
+        raise InputError(f"{board}: {format_validation_error(error)}") from error
 
 
 @cache

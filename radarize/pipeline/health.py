@@ -109,8 +109,8 @@ class Health:
                 longest = max(found, key=lambda span: span.duration)
                 start, stop = longest.start_s - self._first, longest.stop_s - self._first
                 warnings.append(
-                    f"{kind} for {sum(span.duration for span in found):.1f} s in all, at the longest from {start:.1f} to "
-                    f"{stop:.1f} s: {advice}"
+                    f"{kind} for {sum(span.duration for span in found):.1f} s in all, at the longest from "
+                    f"{start:.1f} to {stop:.1f} s: {advice}"
                 )
         return warnings
 

@@ -322,7 +322,7 @@ def emulate(
     console = Console(stderr=True)
     with Emulator(
         given, addresses=Addresses(board, host, command_port, data_port), port_link=port_link,
-        disturbance=disturbance, ahead=ahead, say=lambda line: print(line, flush=True),
+        disturbance=disturbance, ahead=ahead, log=lambda line: print(line, flush=True),
     ) as emulator:  # fmt: skip
         print(f"serial port {port_link or emulator.port}, 115200 baud", flush=True)
         print(f"DCA1000 {board}:{command_port}, sends to {host}:{command_port} and {host}:{data_port}", flush=True)

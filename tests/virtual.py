@@ -94,13 +94,13 @@ def sensor(emulator: Emulator, where: NetworkAddresses, config: RadarConfig = SM
 
 @dataclass
 class Running:
-    """An emulator's process, its serial port and UDP ports, and, when it has ended, what it said."""
+    """An emulator's process, its serial port and UDP ports, and, when it has ended, what it output."""
 
     process: subprocess.Popen
     port: Path
     command_port: int
     data_port: int
-    said: str = ""
+    output: str = ""
 
     @property
     def options(self) -> list[str]:
@@ -128,5 +128,5 @@ def emulator(source: Path | str, folder: Path, *options: object) -> Iterator[Run
         yield running
     finally:
         process.send_signal(signal.SIGINT)
-        running.said = process.communicate(timeout=60)[0]
+        running.output = process.communicate(timeout=60)[0]
     assert process.returncode == 0 and not running.port.is_symlink()

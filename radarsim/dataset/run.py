@@ -44,7 +44,7 @@ def make(
     ray: str | None = None,
     replace: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    say: Callable[[str], None] = print,
+    log: Callable[[str], None] = print,
 ) -> Outcome:
     """Make every recording of a data set that is not there yet.
 
@@ -59,7 +59,7 @@ def make(
         ray: address of a Ray cluster (``auto``: the one of this machine) to use instead.
         replace: make recordings of other parameters anew, instead of refusing.
         progress: called with (frames done, frames in all), recordings found included.
-        say: takes a line for every finished recording.
+        log: takes a line for every finished recording.
 
     Raises:
         InputError: recordings of other parameters are in the folder, another run is at work there, the disk is full, or
@@ -84,11 +84,11 @@ def make(
                     todo[name].clear(folder)
                     if news.full:
                         raise DiskFull(f"{FULL}; {_finished(outcome, tasks, folder)}")
-                    say(f"failed: {news.error}")
+                    log(f"failed: {news.error}")
                 elif news.ended:
                     outcome.made.append(name)
                     done[name] = todo[name].frames
-                    say(f"{name}: {news.result}")
+                    log(f"{name}: {news.result}")
                 else:
                     done[name] = int(news.done)
                 progress(sum(done.values()), total)

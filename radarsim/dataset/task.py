@@ -142,7 +142,7 @@ class Task:
         from radarize.learning.features.keeping import keep_maps
         from radarsim.machine.threads import share_with_drjit
         from radarsim.motion.statistics import Statistics
-        from radarsim.recording.add_sensors import accompany
+        from radarsim.recording.add_sensors import add_sensors
         from radarsim.recording.batches import Batches
         from radarsim.recording.simulate import record
 
@@ -154,7 +154,7 @@ class Task:
         try:
             scenario, cfg_text = self._scenario()
             if late:
-                accompany(final, scenario, late, about, progress)
+                add_sensors(final, scenario, late, about, progress)
             else:
                 path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
                 batches = Batches.of(scenario)

@@ -34,11 +34,11 @@ class Board:
     Args:
         link: data side.
         reset_radar: reboots the radar on the board.
-        say: shows the user a line.
+        log: takes a line for the user, such as "radar: stopped".
     """
 
-    def __init__(self, link: Link, reset_radar: Callable[[], None], say: Callable[[str], None]):
-        self._link, self._reset_radar, self._say = link, reset_radar, say
+    def __init__(self, link: Link, reset_radar: Callable[[], None], log: Callable[[str], None]):
+        self._link, self._reset_radar, self._log = link, reset_radar, log
         self._packets = _DEFAULT
 
     def execute(self, request: Request) -> int:
@@ -46,7 +46,7 @@ class Board:
         try:
             return self._execute(request.command, request.body)
         except InputError as error:
-            self._say(f"board: {error}")
+            self._log(f"board: {error}")
             return _FAILED
 
     def _execute(self, command: int, body: bytes) -> int:
@@ -59,7 +59,7 @@ class Board:
                 self._link.stop()
                 self._packets = _DEFAULT
             case Opcode.RESET_RADAR:
-                self._say("board: radar reset")
+                self._log("board: radar reset")
                 self._reset_radar()
             case Opcode.CONFIGURE:
                 if body[:5] != RAW_TWO_LANES[:5] or len(body) != len(RAW_TWO_LANES):  # the last is a timer
@@ -68,12 +68,12 @@ class Board:
             case Opcode.PACKETS:
                 self._packets = read_packet_settings(body)
             case Opcode.EEPROM:
-                self._say("board: EEPROM written; the emulator keeps its addresses")
+                self._log("board: EEPROM written; the emulator keeps its addresses")
             case Opcode.START:
                 if self._link.recording:
                     raise InputError("start fails, it is recording")
                 self._link.start(*self._packets)
-                self._say(f"board: recording, {self._packets[0] * 1e6:g} us between packets")
+                self._log(f"board: recording, {self._packets[0] * 1e6:g} us between packets")
             case Opcode.STOP:
                 self._link.stop()
             case _:
@@ -99,14 +99,14 @@ class BoardSockets:
     Args:
         at: requests are taken at its `board` and `command_port`; packets go to its `computer` and `data_port`, replies
             to its `command_port`.
-        say: shows the user a line.
+        log: takes a line for the user, such as "radar: stopped".
 
     Raises:
         InputError: the address is in use, or not one of this machine.
     """
 
-    def __init__(self, at: Addresses, say: Callable[[str], None]):
-        self._say, self._unheard = say, False
+    def __init__(self, at: Addresses, log: Callable[[str], None]):
+        self._log, self._unheard = log, False
         self._replies_to, self._data_to = (at.computer, at.command_port), (at.computer, at.data_port)
         self._commands = _bound(at.board, at.command_port)
         try:
@@ -144,7 +144,7 @@ class BoardSockets:
             self._unheard = False
         except OSError as error:
             if not self._unheard:
-                self._say(f"board: packets to {where[0]}:{where[1]} are lost ({error.strerror or error})")
+                self._log(f"board: packets to {where[0]}:{where[1]} are lost ({error.strerror or error})")
             self._unheard = True
 
     def _serve(self, execute: Callable[[Request], int]) -> None:
@@ -156,10 +156,10 @@ class BoardSockets:
             except TimeoutError:
                 continue
             except InputError as error:
-                self._say(f"board: {error}; no reply")
+                self._log(f"board: {error}; no reply")
                 continue
             except OSError as error:
-                self._say(f"board: a request is lost ({error.strerror or error})")
+                self._log(f"board: a request is lost ({error.strerror or error})")
                 self._closed.wait(0.1)
                 continue
             self._send(Reply(request.command, execute(request)).encode(), self._replies_to)

@@ -37,7 +37,7 @@ class Emulator:
         port_link: symbolic link to the serial port.
         disturbance: of the packets on their way.
         ahead: s, how much of the source is made ahead of time.
-        say: shows the user a line.
+        log: takes a line for the user, such as "radar: stopped".
 
     Attributes:
         port: the serial port's path.
@@ -57,9 +57,9 @@ class Emulator:
         port_link: Path | None = None,
         disturbance: Disturbance | None = None,
         ahead: float = 10.0,
-        say: Callable[[str], None] = print,
+        log: Callable[[str], None] = print,
     ):
-        self.source, self._ahead, self._say = source, ahead, say
+        self.source, self._ahead, self._log = source, ahead, log
         self.frames = self.late = 0
         self.lateness = 0.0
         self._running = threading.Event()  # from sensorStart to the end of the last frame
@@ -67,7 +67,7 @@ class Emulator:
         self._left = self._resets = 0
         self._lock = threading.Lock()  # resets and starts come from different threads
         expected = source.expected()
-        self._sockets = BoardSockets(addresses, say)
+        self._sockets = BoardSockets(addresses, log)
         self.link = Link(self._sockets.data, self._sockets.report, disturbance)
         try:
             self._uart = Uart(lambda: CommandLine(self).execute, port_link)
@@ -76,7 +76,7 @@ class Emulator:
             raise
         self.port = self._uart.path
         self._feed = self._feeding(expected)
-        self._sockets.serve(Board(self.link, self._reset, say).execute)
+        self._sockets.serve(Board(self.link, self._reset, log).execute)
         self._thread = threading.Thread(target=self._live, name="radar", daemon=True)
         self._thread.start()
 
@@ -114,7 +114,7 @@ class Emulator:
             self.source.check(config)
             self._prepare(config)
         except InputError as error:
-            self._say(f"radar: sensorStart refused: {error}")
+            self._log(f"radar: sensorStart refused: {error}")
             raise
         with self._lock:
             if self._resets != resets:
@@ -122,14 +122,14 @@ class Emulator:
             self._left = frames or -1
             self._stopping.clear()
             self._running.set()
-        self._say(f"radar: started, {config.frame_rate:.2f} frames/s of {config.frame_bytes} bytes")
+        self._log(f"radar: started, {config.frame_rate:.2f} frames/s of {config.frame_bytes} bytes")
 
     def stop(self) -> None:
         """Stop at the end of the frame in progress, and return then."""
         self._stopping.set()
         while self._running.is_set() and not self._closed.is_set():
             time.sleep(1e-3)
-        self._say(f"radar: stopped; {self}")
+        self._log(f"radar: stopped; {self}")
 
     def __str__(self) -> str:
         late = f", {self.late} of them late, {self.lateness:.2f} s in all" if self.late else ""
@@ -163,7 +163,7 @@ class Emulator:
                 try:
                     self._send(self._feed)
                 except InputError as error:
-                    self._say(f"radar: {error}")
+                    self._log(f"radar: {error}")
                 finally:
                     self._running.clear()
             self.link.advance(time.monotonic() + _IDLE)
@@ -179,12 +179,12 @@ class Emulator:
             starved = not feed.waiting
             if (frame := self._next(feed)) is None:
                 if not self._stopping.is_set():
-                    self._say(f"radar: end of the source; {self}")
+                    self._log(f"radar: end of the source; {self}")
                 break
             if (behind := time.monotonic() - due) > (_ON_TIME if starved else _CATCH_UP):
                 if not self.late:
                     why = "the source" if starved else "this machine"
-                    self._say(f"radar: frame {self.frames + 1} is {behind * 1e3:.0f} ms late: {why} is too slow")
+                    self._log(f"radar: frame {self.frames + 1} is {behind * 1e3:.0f} ms late: {why} is too slow")
                 self.late += 1
                 self.lateness += behind
                 due += behind

@@ -1,6 +1,6 @@
 """From a line on the floor to a motion: pace, heading, gait.
 
-Speed along each leg follows from limits on acceleration and turn rate and from habit; a person adds steps and looks
+Speed along each segment follows from limits on acceleration and turn rate and from habit; a person adds steps and looks
 around. All is sampled at 100 Hz, smoothed over time and handed to C2 splines.
 """
 
@@ -16,28 +16,28 @@ from radarsim.motion.trajectory import Motion, Mounting
 STANDSTILL = 0.5  # at the start, s
 _RATE = 100.0  # Hz
 _MARGIN = 1.0  # s of motion before 0 (still) and after the end
-_BACKED = 22.0  # s, longest leg that is done backward instead of turning round
+_BACKED = 22.0  # s, longest segment that is done backward instead of turning round
 
 
 def drive(
     carrier: Platform,
     mounting: Mounting,
     height: float,
-    legs: list[Float[np.ndarray, "n 2"]],
+    segments: list[Float[np.ndarray, "n 2"]],
     duration: float,
     rng: np.random.Generator,
 ) -> Motion:
-    """Move along legs, one after the other, from a standstill of `STANDSTILL` seconds.
+    """Move along segments, one after the other, from a standstill of `STANDSTILL` seconds.
 
     Args:
         carrier: how it moves.
         mounting: of the sensor on it.
         height: of the mounting's origin above z = 0, m.
-        legs: lines on the floor, m; one starts where the one before ends.
-        duration: s; inf: until the end of the last leg and half a second more.
+        segments: lines on the floor, m; one starts where the one before ends.
+        duration: s; inf: until the end of the last segment and half a second more.
         rng: for habits, steps and glances.
     """
-    place, course = _timeline(carrier, legs, rng)
+    place, course = _timeline(carrier, segments, rng)
     if np.isinf(duration):
         duration = len(place) / _RATE - _MARGIN + STANDSTILL
     steps = int((duration + 2 * _MARGIN + 0.5) * _RATE)
@@ -72,20 +72,20 @@ def drive(
 
 
 def _timeline(
-    carrier: Platform, legs: list[np.ndarray], rng: np.random.Generator
+    carrier: Platform, segments: list[np.ndarray], rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "step 2"], Float[np.ndarray, "step"]]:
-    """Place and course of the carrier's front (rad, unwrapped) at 100 Hz, with turns on the spot between legs."""
+    """Place and course of the carrier's front (rad, unwrapped) at 100 Hz, with turns on the spot between segments."""
     still = int((_MARGIN + STANDSTILL + 4 * carrier.smoothing) * _RATE)
     places: list[np.ndarray] = []
     courses: list[np.ndarray] = []
-    for leg in legs:
-        place, course = _leg(carrier, leg, rng)
+    for segment in segments:
+        place, course = _segment(carrier, segment, rng)
         if not places:
             pause, turning = still, np.full(still, course[0])
         else:
             start = courses[-1][-1]
             change = _wrapped(course[0] - start)
-            short = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() < _BACKED * carrier.speed
+            short = np.linalg.norm(np.diff(segment, axis=0), axis=1).sum() < _BACKED * carrier.speed
             if short and abs(change) > 2.0 and rng.random() < carrier.reversing:
                 course = course + np.pi
                 change = _wrapped(course[0] - start)
@@ -98,11 +98,11 @@ def _timeline(
     return np.concatenate(places), np.concatenate(courses)
 
 
-def _leg(
-    carrier: Platform, leg: Float[np.ndarray, "n 2"], rng: np.random.Generator
+def _segment(
+    carrier: Platform, segment: Float[np.ndarray, "n 2"], rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m"]]:
-    """One leg from standstill to standstill, sampled at 100 Hz."""
-    ahead = np.diff(leg, axis=0)
+    """One segment from standstill to standstill, sampled at 100 Hz."""
+    ahead = np.diff(segment, axis=0)
     step = np.maximum(np.linalg.norm(ahead, axis=1), 1e-6)
     along = np.concatenate([[0], np.cumsum(step)])
     middle = (along[:-1] + along[1:]) / 2
@@ -125,7 +125,7 @@ def _leg(
     speed = np.sqrt(np.maximum(square, 0.0))
     clock = np.concatenate([[0], np.cumsum(2 * step / np.maximum(speed[:-1] + speed[1:], 1e-3))])
     at = np.interp(np.arange(0, clock[-1], 1 / _RATE), clock, along)
-    place = np.stack([np.interp(at, along, leg[:, k]) for k in range(2)], axis=1)
+    place = np.stack([np.interp(at, along, segment[:, k]) for k in range(2)], axis=1)
     return place, np.interp(at, middle, course)
 
 

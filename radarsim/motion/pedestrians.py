@@ -17,7 +17,7 @@ _NEAR, _WAY = (0.8, 3.5), (1.5, 5.0)
 _ATTEMPTS = 60
 
 
-def crowded(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
+def with_pedestrians(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
     """A scene with `count` people more.
 
     Args:

@@ -56,14 +56,14 @@ def plan_motion(
     with naming(f"scene {scene.name}, platform {platform}"):
         if waypoints is not None:
             _check(scene, carrier, clearance, waypoints)
-            legs = route(clearance, carrier.radius, waypoints)
+            segments = route(clearance, carrier.radius, waypoints)
         limit = np.inf if duration is None or waypoints is not None else duration
         for _ in range(_ATTEMPTS):
             if waypoints is None:
                 room = max(carrier.radius, arm + CLEARANCE + 0.05)
                 length = carrier.speed * max(limit, 5.0)
-                legs = tour(clearance, carrier.radius, room, length, rng)
-            motion = drive(carrier, mounting, height, legs, limit, rng)
+                segments = tour(clearance, carrier.radius, room, length, rng)
+            motion = drive(carrier, mounting, height, segments, limit, rng)
             times = np.arange(-0.5, motion.duration + 1.0, 1 / 50.0)
             place = motion.position(times)[:, :2]
             # Lever arm and gait move the sensor off the planned line, and add to its speed.

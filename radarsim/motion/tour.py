@@ -94,7 +94,7 @@ class Ground:
 def tour(
     clearance: Clearance, radius: float, turning: float, length: float, rng: np.random.Generator
 ) -> list[Float[np.ndarray, "n 2"]]:
-    """A tour of at least `length` metres, as smooth legs: out from a home, and back another way where there is one.
+    """A tour of at least `length` metres, as smooth segments: out from a home, and back another way where there is one.
 
     Args:
         clearance: of the platform's body.
@@ -104,7 +104,7 @@ def tour(
         rng: for the goals.
 
     Returns:
-        Legs, each (points, 2) in m. One starts where the one before ends.
+        Segments, each (points, 2) in m. One starts where the one before ends.
 
     Raises:
         InputError: no room to move.
@@ -132,7 +132,7 @@ def tour(
 
 
 def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "m 2"]]:
-    """Smooth legs through way-points, in their order, by the shortest ways.
+    """Smooth segments through way-points, in their order, by the shortest ways.
 
     Args:
         clearance: of the platform's body.

@@ -17,7 +17,7 @@ SLIT = 1.17
 CORNERS = 20
 
 
-def tails(
+def edge_integrals(
     radius: Float[np.ndarray, "radius"], angle: Float[np.ndarray, "angle"]
 ) -> Complex[np.ndarray, "radius angle"]:
     """What an edge diffracts from a point of its line on, without the phase at that point:
@@ -41,9 +41,9 @@ def tails(
 
 
 def _tabulated() -> tuple[tuple[float, float], Complex[np.ndarray, "radius angle"]]:
-    """Steps of radius and angle, and `tails` up to `FAR` either way."""
+    """Steps of radius and angle, and `edge_integrals` up to `FAR` either way."""
     radius, angle = np.linspace(0, np.sqrt(2) * FAR, 72), np.linspace(0, np.pi / 2, 36)
-    return (float(radius[1]), float(angle[1])), tails(radius, angle)
+    return (float(radius[1]), float(angle[1])), edge_integrals(radius, angle)
 
 
 _STEPS, _TAILS = _tabulated()
@@ -168,7 +168,7 @@ def _cubic(at, count):
 
 
 @njit(cache=True)
-def strip(low, high):
+def slit_diffraction(low, high):
     """(1 / (1 + j)) int exp(j pi u^2 / 2) du from low to high: what a slit leaves; 1 for a wide one.
 
     Fresnel's integrals by the auxiliary functions f and g (Abramowitz and Stegun 7.3.9, 7.3.32, 7.3.33), good to 0.002.
@@ -190,8 +190,8 @@ def _from_middle(u):
 
 
 @njit
-def misses(stop, way, square, aperture):
-    """Whether a path leaves nothing worth while: `passes` without a root, for a quick look."""
+def outside_aperture(stop, way, square, aperture):
+    """Whether a path leaves nothing worth while: `aperture_diffraction` without a root, for a quick look."""
     center, normal, u, v, half_u, half_v = aperture
     offset, aside, cosine = minus(stop, center), dot(way, u), dot(way, normal)
     x, y = max(abs(dot(offset, u)) - half_u, 0.0), max(abs(dot(offset, v)) - half_v, 0.0)
@@ -201,7 +201,7 @@ def misses(stop, way, square, aperture):
 
 
 @njit
-def passes(stop, way, square, aperture):
+def aperture_diffraction(stop, way, square, aperture):
     """What the aperture of a mirror passes of a path in a direction over a stop on it.
 
     Args:
@@ -217,7 +217,7 @@ def passes(stop, way, square, aperture):
     across, size = np.sqrt(max(1 - aside * aside, 1e-6)), np.sqrt(square) + 1e-12
     along_u, along_v = across / size, cosine / (across * size)
     x, y, half_x, half_y = dot(offset, u) * along_u, dot(offset, v) * along_v, half_u * along_u, half_v * along_v
-    return strip(-half_x - x, half_x - x) * strip(-half_y - y, half_y - y)
+    return slit_diffraction(-half_x - x, half_x - x) * slit_diffraction(-half_y - y, half_y - y)
 
 
 @njit

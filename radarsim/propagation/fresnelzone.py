@@ -3,7 +3,7 @@
 What a screen with openings leaves of a wave is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
 of sqrt(lambda d (L - d) / 2L), d along a path of length L. It is summed over the nodes of a Fibonacci lattice on a
 square of these units that ends smoothly; such a lattice shows a thin pole as many nodes whichever way it stands
-(Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show whether a stretch
+(Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show whether a segment
 is partly clear, and only then more are looked at. What obstacles diffract from beyond the square is left out.
 
 An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. Two screens on one path multiply
@@ -47,7 +47,7 @@ AT_RADAR = 0.5
 _FEWEST = 4
 #: What mirrors leave open is narrow below this, Fresnel units.
 _NARROW = 2.0
-#: Where an obstacle stands is known to this many halvings of a stretch, and a border to as many of a link.
+#: Where an obstacle stands is known to this many halvings of a segment, and a border to as many of a link.
 _HALVINGS = 4
 #: Rays to a point spread no wider than for an obstacle at this share of the way to it, so wide.
 _BESIDE = 0.7
@@ -55,8 +55,8 @@ _WIDEST = np.sqrt(2 * _BESIDE / (1 - _BESIDE))
 
 
 @dataclass(frozen=True)
-class Stretches(Table):
-    """Straight stretches of mirrored paths, in their order.
+class PathSegments(Table):
+    """Straight segments of mirrored paths, in their order.
 
     Attributes:
         path: which path each is part of, ascending.
@@ -67,44 +67,44 @@ class Stretches(Table):
         stops: where on these, m.
         apart: how far a Fresnel unit along either transverse axis moves the stops, m.
         span: where on the whole path they begin and end, as shares of its length; the path comes back on the same
-            stretch if it ends in its middle.
+            segment if it ends in its middle.
         mirroring: along either axis, whether its end mirrors, 1, or echoes like a point, 0.
     """
 
-    path: Int[np.ndarray, "stretch"]
-    frame: Int[np.ndarray, "stretch"]
-    begin: Float[np.ndarray, "stretch 3"]
-    end: Float[np.ndarray, "stretch 3"]
-    before: Float[np.ndarray, "stretch 2 3"]
-    after: Float[np.ndarray, "stretch 2 3"]
-    mirrors: Int[np.ndarray, "stretch 3"]
-    stops: Float[np.ndarray, "stretch 3 3"]
-    apart: Float[np.ndarray, "stretch 3 2 3"]
-    span: Float[np.ndarray, "stretch 2"]
-    mirroring: Float[np.ndarray, "stretch 2"]
+    path: Int[np.ndarray, "segment"]
+    frame: Int[np.ndarray, "segment"]
+    begin: Float[np.ndarray, "segment 3"]
+    end: Float[np.ndarray, "segment 3"]
+    before: Float[np.ndarray, "segment 2 3"]
+    after: Float[np.ndarray, "segment 2 3"]
+    mirrors: Int[np.ndarray, "segment 3"]
+    stops: Float[np.ndarray, "segment 3 3"]
+    apart: Float[np.ndarray, "segment 3 2 3"]
+    span: Float[np.ndarray, "segment 2"]
+    mirroring: Float[np.ndarray, "segment 2"]
 
 
 def passage(
-    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "path"]
+    observation: Observation, flat: Flat, obstacles: Obstacles, segments: PathSegments, size: Float[np.ndarray, "path"]
 ) -> Passage:
     """What is left of waves along whole paths, out and back.
 
     Args:
         observation, flat, obstacles: the frames, the mirrors, and what is in the way.
-        stretches: of the paths. A path of one stretch comes back on it.
+        segments: of the paths. A path of one segment comes back on it.
         size: amplitude of each path if all of it were clear. Slabs are looked for, and more than one ray, where it is
             so much above the threshold that it matters.
     """
-    path, strength = stretches.path, size[stretches.path]
+    path, strength = segments.path, size[segments.path]
     worth = strength > LEAST_LOSS * observation.threshold
-    found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
-    rows, partly, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
+    found = obstacles.passage(observation, segments.frame, segments.begin, segments.end, worth)
+    rows, partly, place = _partly(observation, flat, obstacles, segments, strength, found.factor)
     smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
     fans, some = _fans(observation, flat, obstacles, partly, place, smooth)
     for column, new in zip(found.columns, some.columns, strict=True):
         column[rows] = new
     returns = np.bincount(path, minlength=len(size)) == 1
-    # Two screens: one that is met again on the way back, or on several stretches the first and the last one.
+    # Two screens: one that is met again on the way back, or on several segments the first and the last one.
     owner, first, count = np.unique(path[rows], return_index=True, return_counts=True)
     last = first + count - 1
     two = returns[owner] | (count > 1)
@@ -125,21 +125,21 @@ def passage(
 
 
 def _partly(
-    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches,
-    strength: Float[np.ndarray, "stretch"], factor: Complex[np.ndarray, "stretch"],
-) -> tuple[Int[np.ndarray, "partly"], Stretches, Float[np.ndarray, "partly"]]:  # fmt: skip
-    """Which stretches are partly clear, fitted to their mirrors, and where what is in the way stands, as a share of the
+    observation: Observation, flat: Flat, obstacles: Obstacles, segments: PathSegments,
+    strength: Float[np.ndarray, "segment"], factor: Complex[np.ndarray, "segment"],
+) -> tuple[Int[np.ndarray, "partly"], PathSegments, Float[np.ndarray, "partly"]]:  # fmt: skip
+    """Which segments are partly clear, fitted to their mirrors, and where what is in the way stands, as a share of the
     whole path."""
-    long = np.any(stretches.begin != stretches.end, axis=1)
+    long = np.any(segments.begin != segments.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
     smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
-    fitted = _fitted(flat, stretches[rows], smooth)
+    fitted = _fitted(flat, segments[rows], smooth)
     few, begin, end, inside = _rays(flat, fitted, FEW, smooth * (_WIDEST - 1))
     clear = obstacles.clear(observation, fitted.frame[few], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
     partly = (unlike > 0) & (inside.sum(axis=1) >= _FEWEST)
-    # Up to where rays come that meet something, of each stretch its first and last such.
+    # Up to where rays come that meet something, of each segment its first and last such.
     hidden = np.flatnonzero(~clear & partly[few])
     number = np.arange(len(hidden)) - np.searchsorted(few[hidden], few[hidden])
     hidden = hidden[(number == 0) | (np.append(number[1:], 0) == 0)]
@@ -167,31 +167,31 @@ def _reach(
     return moved + 0.5 ** (_HALVINGS + 1)
 
 
-def _fitted(flat: Flat, stretches: Stretches, smooth: Bool[np.ndarray, "stretch"]) -> Stretches:
-    """Stretches, some of which (`smooth`) so that nodes lie about the middle of what mirrors leave open, where that is
+def _fitted(flat: Flat, segments: PathSegments, smooth: Bool[np.ndarray, "segment"]) -> PathSegments:
+    """Segments, some of which (`smooth`) so that nodes lie about the middle of what mirrors leave open, where that is
     narrower than a zone.
 
     What a small mirror sends straight back comes from it as from a point.
     """
-    edges = np.empty((len(stretches), 2, 2))
-    _open(flat.corners, flat.normal, stretches.columns, edges)
+    edges = np.empty((len(segments), 2, 2))
+    _open(flat.corners, flat.normal, segments.columns, edges)
     low, high = edges[..., 0], edges[..., 1]
     narrow = (low < high) & (high - low < _NARROW) & smooth[:, None]
     share, middle = np.ones(narrow.shape), np.zeros(narrow.shape)
     share[narrow] = (high - low)[narrow] / _NARROW
     # Rays to all parts of a small plate aim at one place, so that these meet the same obstacles.
     middle[narrow] = np.minimum(2 * (1 - share[narrow]), 1) * (low[narrow] + high[narrow]) / 2
-    at_radar, back = stretches.span[:, :1] == 0, stretches.span[:, 1:] == 0.5
-    mirroring = stretches.mirroring * np.where(back, share, 1)
-    spread = np.where(back, (1 - (1 - AT_RADAR) * mirroring) / (1 - (1 - AT_RADAR) * stretches.mirroring), share)
-    aside = np.where(at_radar, 0, middle), np.where(stretches.span[:, 1:] == 1, 0, middle)
+    at_radar, back = segments.span[:, :1] == 0, segments.span[:, 1:] == 0.5
+    mirroring = segments.mirroring * np.where(back, share, 1)
+    spread = np.where(back, (1 - (1 - AT_RADAR) * mirroring) / (1 - (1 - AT_RADAR) * segments.mirroring), share)
+    aside = np.where(at_radar, 0, middle), np.where(segments.span[:, 1:] == 1, 0, middle)
     return replace(
-        stretches,
-        begin=stretches.begin + np.einsum("sa,sad->sd", aside[0], stretches.before),
-        end=stretches.end + np.einsum("sa,sad->sd", aside[1], stretches.after),
-        before=stretches.before * spread[..., None], after=stretches.after * share[..., None],
-        stops=stretches.stops + np.einsum("sa,sgad->sgd", middle, stretches.apart),
-        apart=stretches.apart * share[:, None, :, None], mirroring=mirroring,
+        segments,
+        begin=segments.begin + np.einsum("sa,sad->sd", aside[0], segments.before),
+        end=segments.end + np.einsum("sa,sad->sd", aside[1], segments.after),
+        before=segments.before * spread[..., None], after=segments.after * share[..., None],
+        stops=segments.stops + np.einsum("sa,sgad->sgd", middle, segments.apart),
+        apart=segments.apart * share[:, None, :, None], mirroring=mirroring,
     )  # fmt: skip
 
 
@@ -199,26 +199,26 @@ def _fans(
     observation: Observation,
     flat: Flat,
     obstacles: Obstacles,
-    stretches: Stretches,
-    place: Float[np.ndarray, "stretch"],
-    smooth: Bool[np.ndarray, "stretch"],
-) -> tuple[Complex[np.ndarray, "stretch 2 node"], Passage]:
+    segments: PathSegments,
+    place: Float[np.ndarray, "segment"],
+    smooth: Bool[np.ndarray, "segment"],
+) -> tuple[Complex[np.ndarray, "segment 2 node"], Passage]:
     """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m. Borders are looked
     for between nodes of some (`smooth`).
 
     Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
     """
-    low, high = stretches.span.T
+    low, high = segments.span.T
     share = (place - low) / (high - low)
-    wide = np.sqrt(stretches.span * (1 - stretches.span))
+    wide = np.sqrt(segments.span * (1 - segments.span))
     wide = np.where(wide > 0, wide, AT_RADAR * wide[:, ::-1])
     mirror = np.sqrt(place * (1 - place)) / ((1 - share) * wide[:, 0] + share * wide[:, 1])
     point = np.sqrt(2 * share / (1 - np.minimum(share, _BESIDE)))
-    spread = mirror[:, None] + (point - mirror)[:, None] * (1 - stretches.mirroring)
+    spread = mirror[:, None] + (point - mirror)[:, None] * (1 - segments.mirroring)
     spread = np.maximum(spread, 0.25)[..., None]
-    shown = replace(stretches, before=stretches.before * spread, after=stretches.after * spread)
+    shown = replace(segments, before=segments.before * spread, after=segments.after * spread)
     many, begin, end, inside = _rays(flat, shown, MANY)
-    passed = obstacles.passage(observation, stretches.frame[many], begin, end, np.ones(len(many), bool))
+    passed = obstacles.passage(observation, segments.frame[many], begin, end, np.ones(len(many), bool))
     wavenumber, count = 2j * np.pi / observation.wavelength, len(share)
     power = np.abs(passed.factor) ** 2
     total = np.maximum(_sums(many, power, count), 1e-30)
@@ -227,7 +227,7 @@ def _fans(
     fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
     fans[:, 1][inside] = 1
     clear[inside] = passed.blocked == 0
-    _soften(observation, obstacles, stretches.frame, (begin, end, inside), passed, smooth, (fans[:, 0], clear))
+    _soften(observation, obstacles, segments.frame, (begin, end, inside), passed, smooth, (fans[:, 0], clear))
     whole = fans[:, 1] @ MANY.weight
     factor = _bounded(fans[:, 0] @ MANY.weight / whole, SLIT)
     through = _sums(many, power * passed.through, count) > total / 2
@@ -235,19 +235,19 @@ def _fans(
 
 
 def _soften(
-    observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "stretch"],
-    rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "stretch node"]],
-    passed: Passage, smooth: Bool[np.ndarray, "stretch"], values: tuple[np.ndarray, ...],
+    observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "segment"],
+    rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "segment node"]],
+    passed: Passage, smooth: Bool[np.ndarray, "segment"], values: tuple[np.ndarray, ...],
 ) -> None:  # fmt: skip
     """Share values of nodes among those about which borders pass, by where on the links between nodes these are.
 
     Args:
         observation, obstacles: the frames, and what is in the way.
-        frame: of each stretch.
-        rays: of the nodes, begin and end, and which nodes of which stretch they are.
+        frame: of each segment.
+        rays: of the nodes, begin and end, and which nodes of which segment they are.
         passed: of the rays.
-        smooth: which stretches.
-        values: of the nodes (stretch, node), written in place.
+        smooth: which segments.
+        values: of the nodes (segment, node), written in place.
     """
     begin, end, inside = rays
     state, number = np.full(inside.shape, -1, np.int8), np.zeros(inside.shape, int)
@@ -279,44 +279,44 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
 
 
-def _rays(flat: Flat, stretches: Stretches, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
-    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are.
+def _rays(flat: Flat, segments: PathSegments, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
+    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which segment these are.
 
-    The outermost rays to points begin by a share, `wider` (by stretch), farther apart: a zone is wider than the cone of
+    The outermost rays to points begin by a share, `wider` (by segment), farther apart: a zone is wider than the cone of
     rays to its tip.
     """
-    inside = np.empty((len(stretches), len(lattice.nodes)), np.bool_)
-    _within(flat.corners, flat.normal, stretches.columns, lattice.nodes, inside)
+    inside = np.empty((len(segments), len(lattice.nodes)), np.bool_)
+    _within(flat.corners, flat.normal, segments.columns, lattice.nodes, inside)
     owner, node = np.nonzero(inside)
     begin, end = np.empty((2, len(owner), 3))
     nodes = lattice.nodes[node]
-    wide = np.broadcast_to(wider, len(stretches))[:, None] * (1 - stretches.mirroring)
+    wide = np.broadcast_to(wider, len(segments))[:, None] * (1 - segments.mirroring)
     cone = nodes * (1 + wide[owner] * (nodes / HALF) ** 2)
-    _spread(stretches.columns, owner, cone, nodes, begin, end)
+    _spread(segments.columns, owner, cone, nodes, begin, end)
     return owner, begin, end, inside
 
 
 @njit(cache=True)
-def _spread(stretches, owner, first, last, begin, end):
+def _spread(segments, owner, first, last, begin, end):
     """Writes where rays begin and end, by their nodes at either end."""
     for r in range(len(owner)):
         i = owner[r]
         for d in range(3):
-            begin[r, d], end[r, d] = stretches.begin[i, d], stretches.end[i, d]
+            begin[r, d], end[r, d] = segments.begin[i, d], segments.end[i, d]
             for axis in range(2):
-                begin[r, d] += first[r, axis] * stretches.before[i, axis, d]
-                end[r, d] += last[r, axis] * stretches.after[i, axis, d]
+                begin[r, d] += first[r, axis] * segments.before[i, axis, d]
+                end[r, d] += last[r, axis] * segments.after[i, axis, d]
 
 
 @njit(cache=True)
-def _within(corners, normal, stretches, nodes, inside):
-    """Writes which nodes are within the mirrors of each stretch."""
+def _within(corners, normal, segments, nodes, inside):
+    """Writes which nodes are within the mirrors of each segment."""
     bounds = np.empty((24, 3))
     for i in range(len(inside)):
-        if i > 0 and stretches.path[i] == stretches.path[i - 1]:
+        if i > 0 and segments.path[i] == segments.path[i - 1]:
             inside[i] = inside[i - 1]
             continue
-        count = _bounds(corners, normal, stretches, i, bounds)
+        count = _bounds(corners, normal, segments, i, bounds)
         for k in range(len(nodes)):
             inside[i, k] = True
             for c in range(count):
@@ -326,14 +326,14 @@ def _within(corners, normal, stretches, nodes, inside):
 
 
 @njit(cache=True)
-def _open(corners, normal, stretches, edges):
-    """Writes from where to where mirrors leave the axes of each stretch open, Fresnel units."""
+def _open(corners, normal, segments, edges):
+    """Writes from where to where mirrors leave the axes of each segment open, Fresnel units."""
     bounds = np.empty((24, 3))
     for i in range(len(edges)):
-        if i > 0 and stretches.path[i] == stretches.path[i - 1]:
+        if i > 0 and segments.path[i] == segments.path[i - 1]:
             edges[i] = edges[i - 1]
             continue
-        count = _bounds(corners, normal, stretches, i, bounds)
+        count = _bounds(corners, normal, segments, i, bounds)
         for axis in range(2):
             low, high = -np.inf, np.inf
             for c in range(count):
@@ -346,17 +346,17 @@ def _open(corners, normal, stretches, edges):
 
 
 @njit
-def _bounds(corners, normal, stretches, i, out):
+def _bounds(corners, normal, segments, i, out):
     """Which rays of a path meet all of its mirrors, and each before the next: one that runs on behind another is lit
     and seen up to where their planes meet. Writes functions of a node, 1, x and y, not negative for these; returns how
     many."""
     count = 0
     for g in range(3):
-        m = stretches.mirrors[i, g]
+        m = segments.mirrors[i, g]
         if m < 0:
             continue
-        stop, n = vec(stretches.stops[i, g]), vec(normal[m])
-        x, y = vec(stretches.apart[i, g, 0]), vec(stretches.apart[i, g, 1])
+        stop, n = vec(segments.stops[i, g]), vec(normal[m])
+        x, y = vec(segments.apart[i, g, 0]), vec(segments.apart[i, g, 1])
         one, two = minus(vec(corners[m, 2]), vec(corners[m, 0])), minus(vec(corners[m, 3]), vec(corners[m, 1]))
         turn = np.sign(dot(cross(one, two), n))
         for k in range(4):
@@ -364,7 +364,7 @@ def _bounds(corners, normal, stretches, i, out):
             inward = cross(n, minus(vec(corners[m, (k + 1) % 4]), one))
             count = _bound((turn, one, inward), (stop, x, y), out, count)
         for other in range(max(g - 1, 0), min(g + 2, 3)):
-            b = stretches.mirrors[i, other]
+            b = segments.mirrors[i, other]
             if b >= 0 and other != g:
                 corner, facing = vec(corners[b, 0]), vec(normal[b])
                 side = np.sign(dot(minus(stop, corner), facing))

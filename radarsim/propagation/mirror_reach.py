@@ -1,6 +1,6 @@
 """Which scatterers light may reach over mirrors: a quick look at millions of chains of mirrors and scatterers.
 
-It leaves out what `apertures.misses` does at the last mirror, and what is too far, turned away or too weak.
+It leaves out what `apertures.outside_aperture` does at the last mirror, and what is too far, turned away or too weak.
 """
 
 from typing import NamedTuple
@@ -145,8 +145,8 @@ def lit_ones(lit):
 def _reach(image, h, most, window, zone, aims, which, lit):
     """Which aims light may reach from an image through its mirror, at height h over the image, `most` over distance.
 
-    A quick look in arrays of single precision: it leaves out what `misses` does, what is too far, turned away or too
-    weak; zone: square of the widest, over the part of the way, m.
+    A quick look in arrays of single precision: it leaves out what `outside_aperture` does, what is too far, turned away
+    or too weak; zone: square of the widest, over the part of the way, m.
     """
     begin, end = which
     f = np.float32

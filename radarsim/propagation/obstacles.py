@@ -110,16 +110,16 @@ class Obstacles:
 
     def way(
         self, observation: Observation, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],
-        stretches: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
+        segments: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
     ) -> Passage:  # fmt: skip
-        """The same for ways of several stretches from the sensor over stops.
+        """The same for ways of several segments from the sensor over stops.
 
         Args:
             stops: m; the last of a way may be followed by others that do not count.
-            stretches: how many of each way's stops count.
+            segments: how many of each way's stops count.
         """
-        first = np.cumsum(stretches) - stretches
-        way = np.repeat(np.arange(len(stretches)), stretches)
+        first = np.cumsum(segments) - segments
+        way = np.repeat(np.arange(len(segments)), segments)
         stop = np.arange(len(way)) - first[way]
         end = stops[way, stop]
         begin = np.roll(end, 1, axis=0)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from numba import njit, prange
 
-from radarsim.propagation.apertures import aperture, misses, passes
+from radarsim.propagation.apertures import aperture, aperture_diffraction, outside_aperture
 from radarsim.propagation.candidates import Candidates
 from radarsim.propagation.fields import (
     along,
@@ -129,7 +129,7 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
             part *= share
             bounce, earlier = along(source, share, earlier), unit(earlier)
             wide = 0.5 * observation.wavelength * full * part * (1 - part)
-            if misses(bounce, earlier, wide, before):
+            if outside_aperture(bounce, earlier, wide, before):
                 continue
         j = aims.scatterer[i]
         cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
@@ -143,9 +143,9 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
         te, tm = mirror(flat.layer[last], min(abs(dot(way, nl)), 1.0))
         if most * size * max(abs(te), abs(tm)) <= least:
             continue
-        passed = passes(stop, way, square, window)
+        passed = aperture_diffraction(stop, way, square, window)
         if two >= 0:
-            passed *= passes(bounce, earlier, wide, before)
+            passed *= aperture_diffraction(bounce, earlier, wide, before)
         if abs(passed) * size <= least:
             continue
         now = unit(leaving)

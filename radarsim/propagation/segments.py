@@ -134,7 +134,7 @@ def _span(observation, flat, m, radar, capsule, ahead):
     longest = length(way) + half + radius
     share = min(farthest / (height + farthest), 0.5)  # of the way that lies beyond the mirror, at most
     zone = STRIP_FAR * np.sqrt(0.5 * observation.wavelength * longest * share * (1 - share))
-    # It is longer in the plane of incidence, by how directions differ from the one to the middle (`apertures.passes`).
+    # It is longer in the plane of incidence, by how directions differ from that to the middle (`aperture_diffraction`).
     far, cosine = length(way), (height + nearest) / longest
     turned, spread = abs(dot(way, vec(flat.u[m]))) / far, (half + radius) / max(far - half - radius, 1e-9)
     zones = (

@@ -92,7 +92,7 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
     leak, mount = find_static(signal, front_end, floor)
     # Thermal noise is what rounding of I and Q and the leakage's phase noise leave of it.
     mask = front_end.settings.phase_noise
-    thermal = floor - 2 / 12 - (np.median(leak.skirt(config, mask)[flat]) if leak and mask else 0.0)
+    thermal = floor - 2 / 12 - (np.median(leak.sidebands(config, mask)[flat]) if leak and mask else 0.0)
     thermal = max(thermal, 0.1 * floor)  # a board with less phase noise than the mask's
     gain, factor = config.rx_gain_db, front_end.settings.noise_factor(config.rx_gain_db)
     dbm = 10 * np.log10(BOLTZMANN * ROOM_TEMPERATURE * config.sample_rate * factor / 1e-3) + gain
@@ -155,7 +155,7 @@ class _Static:
     counts: Complex[np.ndarray, "tx rx"]
     heard: float
 
-    def skirt(self, config: RadarConfig, mask: PhaseNoise) -> Float[np.ndarray, "sample"]:
+    def sidebands(self, config: RadarConfig, mask: PhaseNoise) -> Float[np.ndarray, "sample"]:
         """Power per sample that its phase noise looks like in each range bin, counts^2."""
         f = np.arange(config.samples) * config.sample_rate / config.samples
         noise = density(mask, config.center_frequency, f) * 4 * np.sin(np.pi * f * self.delay) ** 2

@@ -20,7 +20,7 @@ from radarize.io.errors import InputError
 from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
 from radarsim.receiver.frontend_config import FrontEndConfig, MountEcho
-from radarsim.receiver.phasenoise import Skirts
+from radarsim.receiver.phasenoise import Sidebands
 
 BOLTZMANN = 1.380649e-23
 ROOM_TEMPERATURE = 290.0
@@ -62,10 +62,10 @@ class FrontEnd:
         echoes = [self._draw_mount(echo, rng)[enabled] for echo in self.settings.mount or ()]
         self.mount = np.array(echoes, complex).reshape(-1, *self.leakage.shape)
         self._bins = np.arange(config.samples) * config.sample_rate / config.samples
-        self._skirts = None
+        self._sidebands = None
         if self.settings.phase_noise:
             response = np.abs(self.beat_response(self._bins))
-            self._skirts = Skirts(config, self.settings.phase_noise, response)
+            self._sidebands = Sidebands(config, self.settings.phase_noise, response)
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -166,11 +166,11 @@ class FrontEnd:
         """What arrives at the converter, in counts; arguments as for `digitize`."""
         echoes = self._amplify(signal)
         extra = self._thermal(echoes.shape, rng)
-        if self._skirts or self.settings.image_rejection_db is not None:
+        if self._sidebands or self.settings.image_rejection_db is not None:
             bins = scipy.fft.fft(echoes, axis=-1, norm="forward")
-        if self._skirts:
+        if self._sidebands:
             noise = self._bin_noise if self.settings.noise else 0.0
-            extra += self._skirts(bins, *self._static, noise, rng)
+            extra += self._sidebands(bins, *self._static, noise, rng)
         leakage = self._coupled
         if (rejection := self.settings.image_rejection_db) is not None:
             extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra, rejection)
@@ -183,7 +183,7 @@ class FrontEnd:
         steps = np.clip(np.rint(iq / np.float32(step)), -32768 // step, 32767 // step)
         return (steps * step).astype(np.int16).reshape(*counts.shape, 2)
 
-    def by_cause(
+    def by_path_type(
         self, signals: list[Complex[np.ndarray, "loop tx rx sample"]]
     ) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
         """Counts that each of several signals makes without noise and converter, and last those of leakage and mount.

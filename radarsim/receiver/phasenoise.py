@@ -1,4 +1,4 @@
-"""Phase noise after dechirping: strong echoes stand on a skirt, the higher the farther they are.
+"""Phase noise after dechirping: strong echoes stand on a sidebands, the higher the farther they are.
 
 Receiver and transmitter share one oscillator of phase phi(t), so an echo of delay tau keeps phi(t) - phi(t - tau).
 With Fourier coefficients Theta of phi over the ADC window, the echo that fills bin k with S_k adds to bin m
@@ -17,17 +17,17 @@ from numba import njit, prange
 from radarize.radar.config import RadarConfig
 from radarsim.receiver.frontend_config import PhaseNoise
 
-#: Cells whose skirt peaks this far (power) below the thermal noise are left out.
+#: Cells whose sidebands peaks this far (power) below the thermal noise are left out.
 NEGLIGIBLE = 0.01
 
 
-class Skirts:
-    """Adds the skirts of all range cells.
+class Sidebands:
+    """Adds the sidebands of all range cells.
 
     Args:
         config: radar configuration.
         mask: phase noise.
-        response: amplitude response of the IF chain at each bin; it shapes the skirts as well.
+        response: amplitude response of the IF chain at each bin; it shapes the sidebands as well.
     """
 
     def __init__(self, config: RadarConfig, mask: PhaseNoise, response: Float[np.ndarray, "sample"]):
@@ -35,10 +35,10 @@ class Skirts:
         step = config.sample_rate / n
         offset = step * np.arange(-(n - 1), n)
         self._level = np.sqrt(density(mask, config.center_frequency, np.abs(offset)) * step)
-        self._level[n - 1] = 0  # a constant phase is no skirt
+        self._level[n - 1] = 0  # a constant phase is no sidebands
         cell = np.arange(n)
         apart = step * (cell[None, :] - cell[:, None])  # from cell k (row) to bin m
-        # An echo in cell k has been through the filter at k, its skirt goes through it at m.
+        # An echo in cell k has been through the filter at k, its sidebands goes through it at m.
         shape = np.minimum(1, response[None, :] / np.maximum(response[:, None], 1e-6))
         self._difference = (1 - np.exp(-2j * np.pi * apart * (cell / config.bandwidth)[:, None])) * shape
         spread = np.stack([self._level[n - 1 - k : 2 * n - 1 - k] for k in range(n)])
@@ -56,7 +56,7 @@ class Skirts:
         noise: float,
         rng: np.random.Generator,
     ) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """Skirts, by bin.
+        """Sidebands, by bin.
 
         Args:
             bins: Fourier coefficients of the signal without the static echoes.
@@ -77,7 +77,7 @@ class Skirts:
         near = (1 - np.exp(-2j * np.pi * np.outer(delays, self._offset[n - 1 :]))) * self._response
         near = np.einsum("etr,em->trm", static, near)
         out += np.tile(near, (loops, 1, 1)) * theta[:, None, n - 1 :]
-        _add_skirts(bins.reshape(loops * tx, rx, n), theta, self._difference, weakest, out)
+        _add_sidebands(bins.reshape(loops * tx, rx, n), theta, self._difference, weakest, out)
         return out.reshape(bins.shape)
 
 
@@ -94,7 +94,7 @@ def density(mask: PhaseNoise, carrier: float, offset: Float[np.ndarray, "*n"]) -
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _add_skirts(bins, theta, difference, weakest, out):
+def _add_sidebands(bins, theta, difference, weakest, out):
     """out[chirp, rx, m] += sum over cells k of bins[chirp, rx, k] theta[chirp, m - k] difference[k, m]."""
     chirps, rx, n = bins.shape
     for c in prange(chirps):
@@ -105,8 +105,8 @@ def _add_skirts(bins, theta, difference, weakest, out):
                 strongest = max(strongest, s.real * s.real + s.imag * s.imag)
             if strongest <= weakest[k]:
                 continue
-            skirt = theta[c, n - 1 - k : 2 * n - 1 - k] * difference[k]
+            sidebands = theta[c, n - 1 - k : 2 * n - 1 - k] * difference[k]
             for r in range(rx):
                 s = bins[c, r, k]
                 for m in range(n):
-                    out[c, r, m] += s * skirt[m]
+                    out[c, r, m] += s * sidebands[m]

@@ -14,7 +14,7 @@ from radarsim.sensors.suite import Suite
 _SAME = 1e-6  # m, by which a motion that is planned anew may differ
 
 
-def accompany(
+def add_sensors(
     path: Path,
     scenario: Scenario,
     sensors: Sequence[str],

@@ -16,7 +16,7 @@ from radarize.io.recording import Recording, RecordingWriter, spare
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
-from radarsim.motion.pedestrians import crowded
+from radarsim.motion.pedestrians import with_pedestrians
 from radarsim.motion.statistics import Statistics, crossings
 from radarsim.motion.walk import Walk
 from radarsim.receiver.frontend_config import FrontEndConfig
@@ -76,7 +76,7 @@ def planned(
         frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
-        people: pedestrians near the radar's path (see `crowded`).
+        people: pedestrians near the radar's path (see `with_pedestrians`).
         walk_in: scene in which the walk is planned; default: `scene`.
         walk: how the radar goes, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
 
@@ -92,7 +92,7 @@ def planned(
     settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(walk_in or world, seed)
-    world = crowded(world, motion, people, seed)
+    world = with_pedestrians(world, motion, people, seed)
     scenario = Scenario(world, motion, config, settings, seed, names)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
     return scenario, cfg_text, about | ({"people": people} if people else {})

@@ -22,7 +22,7 @@ from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.synthesis import _sincos_cycles
 from radarsim.scenario import Frames, Scenario
-from radarsim.sensors.causes import CAUSES, TYPES
+from radarsim.sensors.by_path_type import PARTS, TYPES
 from radarsim.sensors.scan import AZIMUTHS, axes
 from radarsim.sensors.sensor import Sensor
 
@@ -41,23 +41,23 @@ class Ghosts(Sensor):
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
         config, front_end = scenario.config, scenario.board
-        self._maps = CauseMaps(config)
+        self._maps = PathTypeMaps(config)
         window = np.hanning(config.samples)
         window /= window.sum()
         taper = self._maps.taper
         self._floor = 10 * np.log10(front_end.counts**2 * front_end.noise_power * np.sum(window**2) * np.sum(taper**2))
-        leakage = np.fft.fft(front_end.by_cause([])[0][0] * window, axis=-1).reshape(-1, config.samples)
+        leakage = np.fft.fft(front_end.by_path_type([])[0][0] * window, axis=-1).reshape(-1, config.samples)
         self._leakage = self._maps.beams(leakage[self._maps.row].T[None])
         shape = (config.samples, len(AZIMUTHS))
-        labels = ", ".join(f"{i} {name}" for i, name in enumerate(CAUSES))
+        labels = ", ".join(f"{i} {name}" for i, name in enumerate(PARTS))
         self.streams = {
             "truth/cause_power": Stream(
                 (len(PathType), *shape), "f2", "dB of ADC counts^2",
-                f"range-azimuth power by cause ({', '.join(TYPES)}), not below {DEPTH:g} dB under the noise",
+                f"range-azimuth power by path type ({', '.join(TYPES)}), not below {DEPTH:g} dB under the noise",
             ),
             "truth/cause": Stream(
-                shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise",
-                labels=CAUSES,
+                shape, "u1", "", f"strongest path type of a range-azimuth cell: {labels}, {NOISE} noise",
+                labels=PARTS,
             ),
         }  # fmt: skip
         self.products = axes("truth/cause", config, "range bins")
@@ -72,8 +72,8 @@ class Ghosts(Sensor):
         level = 10 * np.log10(np.maximum(np.stack(power), 10 ** ((self._floor - DEPTH) / 10)))
         return {"truth/cause_power": STEP * np.rint(level / STEP), "truth/cause": np.stack(cause)}
 
-    def label(self, power: Float[np.ndarray, "cause range azimuth"]) -> UInt8[np.ndarray, "range azimuth"]:
-        """Index into `CAUSES` of the strongest one, leakage among them, or `NOISE`."""
+    def label(self, power: Float[np.ndarray, "type range azimuth"]) -> UInt8[np.ndarray, "range azimuth"]:
+        """Index into `PARTS` of the strongest one, leakage among them, or `NOISE`."""
         every = np.concatenate([power, self._leakage[None]])
         return np.where(every.sum(axis=0) > 10 ** (self._floor / 10), every.argmax(axis=0), NOISE).astype(np.uint8)
 
@@ -99,7 +99,7 @@ class _Tones(NamedTuple):
     video: float
 
 
-class CauseMaps:
+class PathTypeMaps:
     """Range-azimuth power of each path type, computed from the echoes.
 
     Args:
@@ -136,7 +136,7 @@ class CauseMaps:
         lengths: Float[np.ndarray, "echo virtual 3"],
         amplitudes: Complex[np.ndarray, "echo"],
         types: UInt8[np.ndarray, "echo"],
-    ) -> Float[np.ndarray, "cause range azimuth"]:
+    ) -> Float[np.ndarray, "type range azimuth"]:
         """Power of each path type in the square of the amplitudes' unit."""
         n = self.config.samples
         spectra = np.zeros((_INSTANTS, len(PathType), n, 2, len(self.row)), np.float32)

@@ -7,7 +7,7 @@ import numpy as np
 from radarize.io.errors import InputError
 from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
-from radarsim.sensors.causes import AdcByCause, CauseCounts
+from radarsim.sensors.by_path_type import AdcByPathType, PathTypeCounts
 from radarsim.sensors.depth import DepthCamera, DepthStrip
 from radarsim.sensors.ghosts import Ghosts
 from radarsim.sensors.imu import Imu
@@ -21,7 +21,7 @@ from radarsim.sensors.tracking import TrackingCamera
 from radarsim.world import plugins
 
 #: Sensors that cost next to nothing and are always there.
-ALWAYS: dict[str, type[Sensor]] = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
+ALWAYS: dict[str, type[Sensor]] = {"pose": TruePose, "scan": PlanarScan, "causes": PathTypeCounts}
 #: Sensors to choose from; plug-ins enter theirs.
 SENSORS: dict[str, type[Sensor]] = {
     "depth": DepthCamera,
@@ -32,7 +32,7 @@ SENSORS: dict[str, type[Sensor]] = {
     "points": ChipPoints,
     "ghosts": Ghosts,
     "lidar": Lidar,
-    "adc-by-cause": AdcByCause,
+    "adc-by-cause": AdcByPathType,
     "paths": TruePaths,
 }
 #: Not part of ``all``: either depth camera writes the same stream, the others are as large as the recording or larger.

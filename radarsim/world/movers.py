@@ -153,13 +153,13 @@ class Person(Mover):
         """
         path = np.asarray(self.path, float)
         tour = np.concatenate([path, path[-2::-1]])
-        legs = np.diff(tour, axis=0)
-        steps = np.linalg.norm(legs, axis=1)
+        segments = np.diff(tour, axis=0)
+        steps = np.linalg.norm(segments, axis=1)
         if not steps.sum():
             return np.tile(path[0], (len(t), 1)), np.zeros(len(t))
-        legs, steps = legs[steps > 0], steps[steps > 0]
+        segments, steps = segments[steps > 0], steps[steps > 0]
         along = np.concatenate([[0], np.cumsum(steps)])
-        bearing = np.arctan2(legs[:, 1], legs[:, 0])
+        bearing = np.arctan2(segments[:, 1], segments[:, 0])
         turns = np.pi - (np.pi - np.diff(bearing, append=bearing[0]) + 1e-9) % (2 * np.pi)  # about-turns: left
         heading = bearing[0] + np.concatenate([[0], np.cumsum(turns)])
 
@@ -169,14 +169,14 @@ class Person(Mover):
             return distance // along[-1], distance % along[-1], weight / weight.sum()
 
         _, part, weight = over(0.25)
-        place = np.stack([np.interp(part, along, np.append(tour[0, i], tour[0, i] + np.cumsum(legs[:, i]))) @ weight
+        place = np.stack([np.interp(part, along, np.append(tour[0, i], tour[0, i] + np.cumsum(segments[:, i]))) @ weight
                           for i in (0, 1)], axis=-1)  # fmt: skip
         lap, part, weight = over(0.45)
-        leg = np.clip(np.searchsorted(along, part, side="right") - 1, 0, len(legs) - 1)
+        segment = np.clip(np.searchsorted(along, part, side="right") - 1, 0, len(segments) - 1)
         # A tabulated step would jump; the turn at a corner is spread over a fifth of a metre before it is averaged.
-        into = np.clip((part - along[leg]) / 0.2, 0, 1)
-        before = np.where(leg > 0, heading[np.maximum(leg - 1, 0)], heading[-2] - (heading[-1] - heading[0]))
-        bearing = before + into * (heading[leg] - before) + lap * (heading[-1] - heading[0])
+        into = np.clip((part - along[segment]) / 0.2, 0, 1)
+        before = np.where(segment > 0, heading[np.maximum(segment - 1, 0)], heading[-2] - (heading[-1] - heading[0]))
+        bearing = before + into * (heading[segment] - before) + lap * (heading[-1] - heading[0])
         return place, bearing @ weight
 
 

@@ -142,7 +142,7 @@ def test_data_sets_of_the_project():
 def test_what_was_drawn_arrives(tmp_path):
     """In the scene, in the sensor's true poses, in the recording and in the index."""
     wanted = hall.specification(tmp_path, randomise=SOME, recordings=hall.recordings(["cart", "robot"], duration=1.5))
-    make(wanted, tmp_path / "out", workers=2, say=lambda _: None)
+    make(wanted, tmp_path / "out", workers=2, log=lambda _: None)
     index = json.loads((tmp_path / "out" / INDEX).read_text())
     assert index["specification"]["randomise"]["clutter"] == SOME["clutter"]
     for task in wanted.tasks:
@@ -170,7 +170,7 @@ def test_same_bytes_whoever_makes_it(tmp_path):
     both = hall.recordings(["cart", "robot"], duration=1)
     for folder, groups, workers in (("a", both, 2), ("b", [both[0] | {"platform": ["robot"]}], 1)):
         make(hall.specification(tmp_path, randomise=SOME, recordings=groups), tmp_path / folder, workers=workers,
-             say=lambda _: None)  # fmt: skip
+             log=lambda _: None)  # fmt: skip
     name = "hall_robot_00.h5"
     assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 

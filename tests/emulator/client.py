@@ -71,6 +71,6 @@ class Client:
 @contextmanager
 def attached(source: object, **options: object) -> Iterator[tuple[Emulator, Client, list[str]]]:
     """An emulator, a client of it, and what it tells its user."""
-    said: list[str] = []
-    with emulated(source, say=said.append, **options) as (emulator, where), Client(emulator.port, where) as client:
-        yield emulator, client, said
+    lines: list[str] = []
+    with emulated(source, log=lines.append, **options) as (emulator, where), Client(emulator.port, where) as client:
+        yield emulator, client, lines

@@ -11,5 +11,5 @@ from tests.virtual import record
 def playing(tmp_path) -> Iterator[tuple[Client, np.ndarray, list[str]]]:
     """A small recording, played."""
     adc = record(tmp_path / "small.h5", SMALL, 12)
-    with attached(tmp_path / "small.h5") as (_, client, said):
-        yield client, adc, said
+    with attached(tmp_path / "small.h5") as (_, client, lines):
+        yield client, adc, lines

@@ -41,14 +41,14 @@ def test_the_wrong_baud_rate_gives_garbage(playing):
 
 
 def test_the_board_resets_the_radar(playing):
-    client, _, said = playing
+    client, _, lines = playing
     client.configure(SMALL)
     assert client.ask(Opcode.RESET_RADAR) == Reply(Opcode.RESET_RADAR, 0)
     client.serial.write(b"sensorStop\n")  # into the void: the radar is booting
     banner = client.serial.read_until(PROMPT.encode()).decode()
     assert "xWR18xx MMW Demo" in banner and "sensorStop" not in banner
     assert "Full configuration must be provided" in client.say("sensorStart 0")
-    assert "board: radar reset" in said
+    assert "board: radar reset" in lines
 
 
 def test_a_link_names_the_port_and_goes_away(tmp_path):

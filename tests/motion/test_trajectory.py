@@ -207,7 +207,7 @@ BENT = ["0 0 0 0 0 0 0 1", "0.5 5 0 0 0 0 0 1", "1 9 0 0 0 0 0 1"]
 
 
 @pytest.mark.parametrize(
-    ("rows", "complaint"),
+    ("rows", "message"),
     [
         ([*GOOD[:3], "100.3 nan 0 1 0 0 0 1", *GOOD[4:]], "line 5: .*expected finite numbers"),
         ([*GOOD[:3], GOOD[2]], "line 5: has time .* ascending"),
@@ -224,8 +224,8 @@ BENT = ["0 0 0 0 0 0 0 1", "0.5 5 0 0 0 0 0 1", "1 9 0 0 0 0 0 1"]
         ([*BENT, "109 9 0 0 0 0 0 1", "109.01 9.1 0 0 0 0 0 1"], "between times 1.000 and 109.000 a smooth curve"),
     ],
 )
-def test_bad_tum(tmp_path, rows, complaint):
-    with pytest.raises(InputError, match=complaint):
+def test_bad_tum(tmp_path, rows, message):
+    with pytest.raises(InputError, match=message):
         motion_from_tum(tum(tmp_path, rows))
 
 

@@ -84,7 +84,7 @@ def test_files(tmp_path, name, text):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "complaint"),
+    ("name", "text", "message"),
     [
         ("a.yaml", "- [1, 2]\n- [1, x]\n", "a.yaml, way-point 2: is '1 x', expected two finite numbers"),
         ("a.yaml", "- [1, 2]\n- '34'\n", "a.yaml, way-point 2: is '34'"),
@@ -97,24 +97,24 @@ def test_files(tmp_path, name, text):
         ("a.csv", "", "a.csv: holds 0 way-points"),
     ],
 )
-def test_bad_files(tmp_path, name, text, complaint):
+def test_bad_files(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
-    with pytest.raises(InputError, match=complaint):
+    with pytest.raises(InputError, match=message):
         read_waypoints(tmp_path / name)
     with pytest.raises(InputError, match="gone.csv: no such file"):
         read_waypoints(tmp_path / "gone.csv")
 
 
 @pytest.mark.parametrize(
-    ("place", "complaint"),
+    ("place", "message"),
     [
         ([9.0, 5.2], r"office, platform handheld: way-point 2 \(x 9.00, y 5.20 m\) lies 0.[012]. m .*0.40 m or more"),
         ([9.0, 4.92], r"way-point 2 .* lies where there is no floor"),
         ([99.0, 3.0], "way-point 2 .* lies outside the scene"),
     ],
 )
-def test_places_nobody_can_stand_at(office, place, complaint):
-    with pytest.raises(InputError, match=complaint):
+def test_places_nobody_can_stand_at(office, place, message):
+    with pytest.raises(InputError, match=message):
         plan_motion(office, "handheld", None, np.random.default_rng(0), np.array([PLACES[0], place]))
 
 

@@ -289,7 +289,7 @@ def test_parts_by_cause_add_up():
     """With noise off, what each signal makes and the leakage are together what the front end makes of their sum."""
     front = FrontEnd(CONFIG, FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None), rng())
     signals = [tone(3, -60), tone(30.3, -70), tone(70.9, -80)]
-    parts, whole = front.by_cause(signals), front.receive(np.sum(signals, axis=0), rng())
+    parts, whole = front.by_path_type(signals), front.receive(np.sum(signals, axis=0), rng())
     assert len(parts) == 4
     assert np.abs(np.sum(parts, axis=0) - whole).max() < 1e-5 * np.abs(whole).max()
 

@@ -22,7 +22,7 @@ from radarsim.dataset.run import INDEX, make
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
 from radarsim.recording import batches
-from radarsim.recording.add_sensors import accompany
+from radarsim.recording.add_sensors import add_sensors
 from radarsim.recording.batches import Batches
 from radarsim.recording.simulate import planned, simulate
 from radarsim.scenario import Scenario
@@ -119,7 +119,7 @@ def after_a_kill(plan, path, monkeypatch):
 def with_sensors_added_later(plan, path, monkeypatch):
     """Those that look at the radar's echoes and samples, too."""
     simulate(output=path, **plan | {"sensors": ()})
-    accompany(path, planned(**plan)[0], chosen(plan["sensors"]))
+    add_sensors(path, planned(**plan)[0], chosen(plan["sensors"]))
 
 
 class Killed(Exception):

@@ -14,7 +14,7 @@ from radarsim.motion.planner import plan_motion
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording.simulate import simulate
-from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.by_path_type import PARTS
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
@@ -81,7 +81,7 @@ def test_iq_by_cause_adds_up(tmp_path):
         adc = recording.adc(0, len(recording)).astype(np.float32)
         about = recording.describe("truth/adc_by_cause")["about"]
         count = recording.read("truth/echoes")
-    assert parts.shape == (len(adc), len(CAUSES), *adc.shape[1:])
+    assert parts.shape == (len(adc), len(PARTS), *adc.shape[1:])
     assert all(p.name.lower() in about for p in PathType) and "leakage" in about
     inside = np.abs(adc).max(axis=-1, keepdims=True) < 32767
     error = (parts.sum(axis=1) - adc) * inside

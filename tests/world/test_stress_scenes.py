@@ -11,7 +11,7 @@ from radarsim.motion.statistics import crossings
 from radarsim.motion.walk import Walk
 from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Scenario
-from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.by_path_type import PARTS
 from radarsim.sensors.ghosts import DEPTH, NOISE, Ghosts
 from radarsim.sensors.scan import PlanarScan
 from radarsim.world.scene import Scene
@@ -25,7 +25,7 @@ def caused_by(*causes: PathType) -> Callable[[dict[str, np.ndarray], np.ndarray]
 
     def share(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
         cause = seen["truth/cause"]
-        heard = (cause != NOISE) & (cause != CAUSES.index("leakage"))
+        heard = (cause != NOISE) & (cause != PARTS.index("leakage"))
         return float(np.isin(cause, causes)[heard].mean())
 
     return share

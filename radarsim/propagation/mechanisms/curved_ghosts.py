@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.propagation.apertures import STRIP_FAR, aperture, misses, passes, strip
+from radarsim.propagation.apertures import STRIP_FAR, aperture, aperture_diffraction, outside_aperture, slit_diffraction
 from radarsim.propagation.curved import grazes, growth, halving
 from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
@@ -155,7 +155,7 @@ def _add(observation, frame, flat, way, echo, found):
     for m, (_, stop, direction, square) in ((one, out), (two, back)):
         size *= gain_towards(minus(stop, p), observation.rotation[frame], observation)
         if m >= 0:
-            size *= passes(stop, direction, square, aperture(flat, m))
+            size *= aperture_diffraction(stop, direction, square, aperture(flat, m))
     if abs(size) <= observation.threshold:
         return 0
     value = size * _polarisation(observation, frame, flat, way, (lit, n, layer))
@@ -199,7 +199,7 @@ def _strength(observation, flat, bodies, b, way):
     low, high = _above(flat, second, two, line, axis, _above(flat, first, one, line, axis, (-half, half)))
     if low >= high or z <= low - STRIP_FAR * zone or z >= high + STRIP_FAR * zone:
         return none, none, none, 0j
-    return place, along(line, aim(z, low, high), axis), n, size * strip((low - z) / zone, (high - z) / zone)
+    return place, along(line, aim(z, low, high), axis), n, size * slit_diffraction((low - z) / zone, (high - z) / zone)
 
 
 @njit
@@ -231,7 +231,7 @@ def _stop(observation, flat, m, source, place):
     share, way = h / (h - level), minus(place, source)
     stop, square = along(source, share, way), 0.5 * observation.wavelength * length(way) * share * (1 - share)
     way = unit(way)
-    return not misses(stop, way, square, window), stop, way, square
+    return not outside_aperture(stop, way, square, window), stop, way, square
 
 
 @njit

@@ -42,7 +42,7 @@ from radarsim.propagation.fields import (
     vec,
     write,
 )  # fmt: skip
-from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.fresnelzone import AT_RADAR, PathSegments
 from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Kind, Paths
@@ -79,8 +79,8 @@ def find(view: View) -> Paths:
     found = [chains(flat, some.pairs, observation, k) for k, some in enumerate(view.mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), Chains.joined(found)
     two = every.mirrors[:, 1] == every.mirrors[:, 2]
-    stretches = _stretches(observation, flat, frame, every)
-    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(every.amplitude))
+    segments = _segments(observation, flat, frame, every)
+    passed = fresnelzone.passage(observation, flat, view.obstacles, segments, np.abs(every.amplitude))
     directions = []
     for reverse, rows in (
         (False, np.arange(len(every))),
@@ -98,8 +98,8 @@ def find(view: View) -> Paths:
     return Paths.joined(directions)
 
 
-def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "chain"], chains: Chains) -> Stretches:
-    """The four stretches of each chain, of two mirrors one of no length."""
+def _segments(observation: Observation, flat: Flat, frame: Int[np.ndarray, "chain"], chains: Chains) -> PathSegments:
+    """The four segments of each chain, of two mirrors one of no length."""
     here = observation.position[frame, None]
     stops = np.concatenate([here, chains.stops, here], axis=1)
     way = np.diff(stops, axis=1)
@@ -125,7 +125,7 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
     mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
     along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
     mirrors, reflections, aside = (np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4]))
-    return Stretches(
+    return PathSegments(
         path=np.repeat(np.arange(len(frame)), 4), frame=np.repeat(frame, 4),
         begin=stops[:, :-1].reshape(-1, 3), end=stops[:, 1:].reshape(-1, 3),
         before=apart[:, :-1].reshape(-1, 2, 3), after=apart[:, 1:].reshape(-1, 2, 3),

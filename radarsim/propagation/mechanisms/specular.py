@@ -8,7 +8,7 @@ from jaxtyping import Complex, Float, Int
 from radarsim.propagation import fresnelzone, patches, plates
 from radarsim.propagation.curved import LINE, SpecularPoints
 from radarsim.propagation.environment import View
-from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.fresnelzone import AT_RADAR, PathSegments
 from radarsim.propagation.isometry import image
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Kind, Paths
@@ -48,8 +48,8 @@ def find(view: View) -> Paths:
         Paths.of(Kind.CURVED, curved.geometry, curved.amplitude, frame=of_curved),
     ])  # fmt: skip
     ways = [_to_parts(observation, of_part, flat, parts), _to_bodies(observation, of_curved, curved)]
-    stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
-    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(paths.amplitude))
+    segments = replace(PathSegments.joined(ways), path=np.arange(len(paths)))
+    passed = fresnelzone.passage(observation, flat, view.obstacles, segments, np.abs(paths.amplitude))
     lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
     paths = replace(paths, amplitude=paths.amplitude * np.exp(-2j * np.pi * lag / observation.wavelength))
     return paths.behind(observation, replace(passed, delay=passed.delay + lag))
@@ -101,7 +101,9 @@ def _merged(
     return np.append(frame[rest], frame[one]), SpecularPoints.joined([parts[rest], strips])
 
 
-def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints) -> Stretches:
+def _to_parts(
+    observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints
+) -> PathSegments:
     """Path segments to parts of plates: a face mirrors, an edge mirrors along its line, a corner echoes like a point.
 
     Across an edge that is near the specular point, in Fresnel units, it is a part of the same zone and goes over into
@@ -127,7 +129,7 @@ def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Fl
     mirrors = np.where(np.arange(3) == 0, np.where(kind == -3, -1, parts.facet)[:, None], -1)
     stops = np.repeat(parts.aim[:, None], 3, axis=1), np.repeat(after[:, None], 3, axis=1)
     span = np.tile([0.0, 0.5], (n, 1))
-    return Stretches(
+    return PathSegments(
         np.zeros(n, int), frame, here, parts.aim, before, after, mirrors, *stops, span, mirroring
     )  # fmt: skip
 
@@ -138,7 +140,7 @@ def _spread(mirroring, axes):
     return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
 
 
-def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved: SpecularPoints) -> Stretches:
+def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved: SpecularPoints) -> PathSegments:
     """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
     begin, n = observation.position[frame], len(curved)
     way = curved.aim - begin
@@ -152,7 +154,7 @@ def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved
     mirroring = np.column_stack([line, np.zeros(n)]).astype(float)
     before, after = _spread(mirroring, axes)
     none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
-    return Stretches(
+    return PathSegments(
         np.zeros(n, int), frame, begin, curved.aim, before, after, *none, span, mirroring
     )  # fmt: skip
 

@@ -209,7 +209,7 @@ TRIANGLE = "v 0 0 0\nv 4 0 0\nv 0 4 0\nf 1 2 3\n"
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "options", "complaint"),
+    ("name", "text", "options", "message"),
     [
         ("gone.glb", None, {}, "gone.glb: no such file"),
         ("nan.ply", NAN, {}, "part 'nan' has 1 corners that are no finite numbers"),
@@ -233,13 +233,13 @@ TRIANGLE = "v 0 0 0\nv 4 0 0\nv 0 4 0\nf 1 2 3\n"
         ("a.obj", TRIANGLE, {"materials": "'*': ["}, "map.yaml: malformed YAML"),
     ],
 )
-def test_mistakes_get_one_sentence(tmp_path, name, text, options, complaint):
+def test_mistakes_get_one_sentence(tmp_path, name, text, options, message):
     if text is not None:
         (tmp_path / name).write_text(text)
     if "materials" in options:
         (tmp_path / "map.yaml").write_text(options["materials"])
         options = {"materials": tmp_path / "map.yaml"}
-    with pytest.raises(InputError, match=complaint) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         import_scene(tmp_path / name, tmp_path / "out", Options(**options))
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
 

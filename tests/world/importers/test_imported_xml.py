@@ -90,7 +90,7 @@ CUBE = '<shape type="cube" id="c">{}</shape>'
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("text", "message"),
     [
         ("<scene><shape", "is not readable XML"),
         ("<html/>", "its root is <html>, expected <scene>"),
@@ -105,8 +105,8 @@ CUBE = '<shape type="cube" id="c">{}</shape>'
         ("<scene>" + CUBE.format('<transform><scale value="x"/></transform>') + "</scene>", "shape 'c': .*'x'"),
     ],
 )  # fmt: skip
-def test_mistakes_get_one_sentence(tmp_path, text, complaint):
+def test_mistakes_get_one_sentence(tmp_path, text, message):
     (tmp_path / "a.xml").write_text(text)
-    with pytest.raises(InputError, match=complaint) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         import_scene(tmp_path / "a.xml", tmp_path / "out")
     assert "\n" not in str(caught.value)

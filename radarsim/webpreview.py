@@ -48,8 +48,8 @@ def web_preview(scene: Scene, output: Path, walk: Walk | None = None, time: floa
     page.plot(figure, height=720)
     page.text(
         f"The {RAYS} strongest echoes of each path type. Rays over mirrors are drawn unfolded: straight to the "
-        "apparent place of the target for the transmitter, and from its apparent place for the receiver. A click on a path "
-        "type hides it."
+        "apparent place of the target for the transmitter, and from its apparent place for the receiver. "
+        "A click on a path type hides it."
     )
     counts = np.bincount(types, minlength=len(PathType))
     powers = np.bincount(types, np.abs(paths.amplitude) ** 2, minlength=len(PathType))

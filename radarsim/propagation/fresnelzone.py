@@ -1,22 +1,24 @@
-"""How much of a mirrored path is clear: obstacles over its first Fresnel zones, not on one ray.
+"""Obstruction of a mirrored path within its first Fresnel zones, instead of on a single ray.
 
-What a screen with openings leaves of a wave is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
+Behind a screen with openings the amplitude is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
 of sqrt(lambda d (L - d) / 2L), d along a path of length L. It is summed over the nodes of a Fibonacci lattice on a
-square of these units that ends smoothly; such a lattice shows a thin pole as many nodes whichever way it stands
-(Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show whether a segment
-is partly clear, and only then more are looked at. What obstacles diffract from beyond the square is left out.
+square of these units with smooth borders; on such a lattice a thin pole covers the same number of nodes at any
+orientation (Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show
+whether
+a segment is partly clear, and only then more are tested. Diffraction by obstacles beyond the square is neglected.
 
-An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. Two screens on one path multiply
-only if they are far apart; in general (Vogler, Radio Science 17(6), 1982, of knife edges) the field is the double
+An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. The losses of two screens on one path
+multiply only if they are far apart; in general (Vogler, Radio Science 17(6), 1982, of knife edges) the field is the
+double
 integral over both of
 
     exp(j pi (u_1^2 + u_2^2 - 2 rho u_1 . u_2) / (2 (1 - rho^2))),  rho = sqrt(d_1 (L - d_2) / (d_2 (L - d_1))),
 
-a complex normal distribution of correlation rho: one screen for rho = 1, an obstacle at the mirror, two that multiply
-for rho = 0, an obstacle at the radar. A half plane half way to a mirror that just touches the path leaves
-1/4 + asin(1/3) / (2 pi) = -10.3 dB. What echoes like a point has rho = 0 wherever the obstacle is, since a point sends
-its own wave back: the ways to it and back multiply; an edge or a cylinder does so across its line. For the same reason
-the single rays to scatterers (`paths`), which count twice, have the right mean power in the shadow of an edge.
+a complex normal distribution of correlation rho: one screen for rho = 1, an obstacle at the mirror; two factors that
+multiply for rho = 0, an obstacle at the radar. A half plane half way to a mirror whose edge touches the path leaves
+1/4 + asin(1/3) / (2 pi) = -10.3 dB. A point scatterer has rho = 0 wherever the obstacle is, because it radiates a wave
+of its own: the factors of both directions multiply; for an edge or a cylinder this holds across its line. For the same
+reason the single rays to scatterers (`paths`), which count twice, have the correct mean power in the shadow of an edge.
 """
 
 from dataclasses import dataclass, replace
@@ -34,22 +36,22 @@ from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table
 
-#: Slabs are looked for in the way of echoes that are at least this much stronger than the threshold.
+#: Slabs on a path are tested for echoes that exceed the threshold at least by this factor.
 LEAST_LOSS = 4.0
-#: The same for zones: some 16 dB over noise.
+#: The same for Fresnel zones: some 16 dB over noise.
 LEAST_SPLIT = 20.0
-#: Echoes that are at least this much stronger are free of steps, some 40 dB over noise: by zones of narrow mirrors and
-#: points, and by where borders pass between nodes.
+#: Echoes that exceed the threshold at least by this factor, some 40 dB over noise, are free of steps: zones of narrow
+#: mirrors and points, and borders between nodes, are resolved.
 LEAST_SMOOTH = 400.0
-#: At the radar rays are so far apart, as a share of what they are at a mirror.
+#: Distance between rays at the radar, relative to that at a mirror.
 AT_RADAR = 0.5
-#: Fewer nodes than this within a mirror say less than the one ray through its middle.
+#: Smallest number of nodes within a mirror; with fewer, the one ray through its middle is more accurate.
 _FEWEST = 4
-#: What mirrors leave open is narrow below this, Fresnel units.
+#: Openings of mirrors below this width are narrow, Fresnel units.
 _NARROW = 2.0
-#: Where an obstacle stands is known to this many halvings of a segment, and a border to as many of a link.
+#: Number of bisections that locate an obstacle on a segment, and a border on a link.
 _HALVINGS = 4
-#: Rays to a point spread no wider than for an obstacle at this share of the way to it, so wide.
+#: Rays to a point are spread at most as for an obstacle at this fraction of the path, and by this factor.
 _BESIDE = 0.7
 _WIDEST = np.sqrt(2 * _BESIDE / (1 - _BESIDE))
 
@@ -59,16 +61,16 @@ class PathSegments(Table):
     """Straight segments of mirrored paths, in their order.
 
     Attributes:
-        path: which path each is part of, ascending.
-        frame: index.
-        begin, end: m.
-        before, after: how far a Fresnel unit along either transverse axis moves begin and end, m.
-        mirrors: of the whole path, in order, within whose outlines its rays are reflected; -1: none.
-        stops: where on these, m.
-        apart: how far a Fresnel unit along either transverse axis moves the stops, m.
-        span: where on the whole path they begin and end, as shares of its length; the path comes back on the same
-            segment if it ends in its middle.
-        mirroring: along either axis, whether its end mirrors, 1, or echoes like a point, 0.
+        path: index of the path, ascending.
+        frame: index of the frame.
+        begin, end: ends of the segment, m.
+        before, after: shift of begin and end per Fresnel unit along either transverse axis, m.
+        mirrors: mirrors of the whole path, in order, whose outlines bound its rays; -1: none.
+        stops: points of reflection on these, m.
+        apart: shift of the stops per Fresnel unit along either transverse axis, m.
+        span: start and end on the whole path, as fractions of its length; if the segment ends in the middle, the path
+            returns on it.
+        mirroring: along either axis, 1 if its end is a mirror, 0 if a point scatterer.
     """
 
     path: Int[np.ndarray, "segment"]
@@ -87,13 +89,14 @@ class PathSegments(Table):
 def passage(
     observation: Observation, flat: Flat, obstacles: Obstacles, segments: PathSegments, size: Float[np.ndarray, "path"]
 ) -> Passage:
-    """What is left of waves along whole paths, out and back.
+    """Factor on the amplitude of whole paths, out and back, by obstacles.
 
     Args:
-        observation, flat, obstacles: the frames, the mirrors, and what is in the way.
-        segments: of the paths. A path of one segment comes back on it.
-        size: amplitude of each path if all of it were clear. Slabs are looked for, and more than one ray, where it is
-            so much above the threshold that it matters.
+        observation, flat, obstacles: the frames, the mirrors, and the obstacles.
+        segments: segments of the paths. A path of one segment returns on it.
+        size: amplitude of each path if it were clear. Slabs, and more than one ray, are tested only for paths far
+            enough
+            above the threshold.
     """
     path, strength = segments.path, size[segments.path]
     worth = strength > LEAST_LOSS * observation.threshold
@@ -104,7 +107,7 @@ def passage(
     for column, new in zip(found.columns, some.columns, strict=True):
         column[rows] = new
     returns = np.bincount(path, minlength=len(size)) == 1
-    # Two screens: one that is met again on the way back, or on several segments the first and the last one.
+    # Two screens: one that is met again on the way back, or, on several segments, the first and the last one.
     owner, first, count = np.unique(path[rows], return_index=True, return_counts=True)
     last = first + count - 1
     two = returns[owner] | (count > 1)
@@ -128,18 +131,19 @@ def _partly(
     observation: Observation, flat: Flat, obstacles: Obstacles, segments: PathSegments,
     strength: Float[np.ndarray, "segment"], factor: Complex[np.ndarray, "segment"],
 ) -> tuple[Int[np.ndarray, "partly"], PathSegments, Float[np.ndarray, "partly"]]:  # fmt: skip
-    """Which segments are partly clear, fitted to their mirrors, and where what is in the way stands, as a share of the
-    whole path."""
+    """Segments that are partly clear, fitted to their mirrors, and the position of the obstacle as a fraction of the
+    whole
+    path."""
     long = np.any(segments.begin != segments.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
     smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
     fitted = _fitted(flat, segments[rows], smooth)
     few, begin, end, inside = _rays(flat, fitted, FEW, smooth * (_WIDEST - 1))
     clear = obstacles.clear(observation, fitted.frame[few], begin, end)
-    # Alike are all that are as the ray in the middle; then what that met is all there is.
+    # A segment is uniform if all rays equal the one in the middle, whose result then holds for the segment.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
     partly = (unlike > 0) & (inside.sum(axis=1) >= _FEWEST)
-    # Up to where rays come that meet something, of each segment its first and last such.
+    # Position up to which obstructed rays are clear; of each segment the first and last such.
     hidden = np.flatnonzero(~clear & partly[few])
     number = np.arange(len(hidden)) - np.searchsorted(few[hidden], few[hidden])
     hidden = hidden[(number == 0) | (np.append(number[1:], 0) == 0)]
@@ -158,8 +162,9 @@ def _reach(
     two: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"]],
     through: Bool[np.ndarray, "ray"] | None = None,
 ) -> Float[np.ndarray, "ray"]:  # fmt: skip
-    """How far clear rays can move towards hidden ones (begin and end of either, m) before they are hidden, as a share
-    of the whole way; `through` as in `Obstacles.clear`."""
+    """Distance by which clear rays can move towards hidden ones (begin and end of either, m) before they are hidden, as
+    a
+    fraction of the whole distance; `through` as in `Obstacles.clear`."""
     moved = np.zeros(len(frame))
     for step in 0.5 ** np.arange(1, _HALVINGS + 1):
         begin, end = (a + (moved + step)[:, None] * (b - a) for a, b in zip(one, two, strict=True))
@@ -168,10 +173,10 @@ def _reach(
 
 
 def _fitted(flat: Flat, segments: PathSegments, smooth: Bool[np.ndarray, "segment"]) -> PathSegments:
-    """Segments, some of which (`smooth`) so that nodes lie about the middle of what mirrors leave open, where that is
-    narrower than a zone.
+    """Segments, with nodes shifted for some (`smooth`) to the middle of the mirrors' opening if that is narrower than a
+    zone.
 
-    What a small mirror sends straight back comes from it as from a point.
+    A small mirror scatters straight back like a point.
     """
     edges = np.empty((len(segments), 2, 2))
     _open(flat.corners, flat.normal, segments.columns, edges)
@@ -179,7 +184,7 @@ def _fitted(flat: Flat, segments: PathSegments, smooth: Bool[np.ndarray, "segmen
     narrow = (low < high) & (high - low < _NARROW) & smooth[:, None]
     share, middle = np.ones(narrow.shape), np.zeros(narrow.shape)
     share[narrow] = (high - low)[narrow] / _NARROW
-    # Rays to all parts of a small plate aim at one place, so that these meet the same obstacles.
+    # Rays to all parts of a small plate end at one point, so that they meet the same obstacles.
     middle[narrow] = np.minimum(2 * (1 - share[narrow]), 1) * (low[narrow] + high[narrow]) / 2
     at_radar, back = segments.span[:, :1] == 0, segments.span[:, 1:] == 0.5
     mirroring = segments.mirroring * np.where(back, share, 1)
@@ -203,10 +208,11 @@ def _fans(
     place: Float[np.ndarray, "segment"],
     smooth: Bool[np.ndarray, "segment"],
 ) -> tuple[Complex[np.ndarray, "segment 2 node"], Passage]:
-    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m. Borders are looked
-    for between nodes of some (`smooth`).
+    """Factors of many rays, zero beyond the mirrors' outlines; which rays are within; and delays, m. Borders between
+    nodes
+    are located for some segments (`smooth`).
 
-    Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
+    Rays are straight and zones are not: the rays are spread such that they are correct at the obstacle.
     """
     low, high = segments.span.T
     share = (place - low) / (high - low)
@@ -239,15 +245,16 @@ def _soften(
     rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "segment node"]],
     passed: Passage, smooth: Bool[np.ndarray, "segment"], values: tuple[np.ndarray, ...],
 ) -> None:  # fmt: skip
-    """Share values of nodes among those about which borders pass, by where on the links between nodes these are.
+    """Distribute values of nodes on either side of borders according to the borders' position on the links between
+    nodes.
 
     Args:
-        observation, obstacles: the frames, and what is in the way.
-        frame: of each segment.
-        rays: of the nodes, begin and end, and which nodes of which segment they are.
-        passed: of the rays.
-        smooth: which segments.
-        values: of the nodes (segment, node), written in place.
+        observation, obstacles: the frames, and the obstacles.
+        frame: frame of each segment.
+        rays: rays of the nodes, begin and end, and the mask of nodes of each segment.
+        passed: factors of the rays.
+        smooth: mask of segments.
+        values: values of the nodes (segment, node), modified in place.
     """
     begin, end, inside = rays
     state, number = np.full(inside.shape, -1, np.int8), np.zeros(inside.shape, int)
@@ -280,10 +287,10 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
 
 
 def _rays(flat: Flat, segments: PathSegments, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
-    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which segment these are.
+    """Rays within the mirrors' outlines: their segments, begin, end; and the mask of nodes of each segment.
 
-    The outermost rays to points begin by a share, `wider` (by segment), farther apart: a zone is wider than the cone of
-    rays to its tip.
+    The outermost rays to points begin farther apart by a fraction `wider` (per segment): a zone is wider than the cone
+    of rays to its tip.
     """
     inside = np.empty((len(segments), len(lattice.nodes)), np.bool_)
     _within(flat.corners, flat.normal, segments.columns, lattice.nodes, inside)
@@ -298,7 +305,7 @@ def _rays(flat: Flat, segments: PathSegments, lattice: Lattice, wider: ArrayLike
 
 @njit(cache=True)
 def _spread(segments, owner, first, last, begin, end):
-    """Writes where rays begin and end, by their nodes at either end."""
+    """Write begin and end of rays from their nodes at either end."""
     for r in range(len(owner)):
         i = owner[r]
         for d in range(3):
@@ -310,7 +317,7 @@ def _spread(segments, owner, first, last, begin, end):
 
 @njit(cache=True)
 def _within(corners, normal, segments, nodes, inside):
-    """Writes which nodes are within the mirrors of each segment."""
+    """Mark the nodes within the mirrors of each segment."""
     bounds = np.empty((24, 3))
     for i in range(len(inside)):
         if i > 0 and segments.path[i] == segments.path[i - 1]:
@@ -327,7 +334,7 @@ def _within(corners, normal, segments, nodes, inside):
 
 @njit(cache=True)
 def _open(corners, normal, segments, edges):
-    """Writes from where to where mirrors leave the axes of each segment open, Fresnel units."""
+    """Write the interval that mirrors leave open on both axes of each segment, Fresnel units."""
     bounds = np.empty((24, 3))
     for i in range(len(edges)):
         if i > 0 and segments.path[i] == segments.path[i - 1]:
@@ -347,9 +354,10 @@ def _open(corners, normal, segments, edges):
 
 @njit
 def _bounds(corners, normal, segments, i, out):
-    """Which rays of a path meet all of its mirrors, and each before the next: one that runs on behind another is lit
-    and seen up to where their planes meet. Writes functions of a node, 1, x and y, not negative for these; returns how
-    many."""
+    """Bounds of the rays that meet all mirrors of a path in their order; a mirror that extends behind another is used
+    only
+    up to the line where their planes meet. Writes linear functions of a node (1, x and y), not negative for such rays;
+    returns their number."""
     count = 0
     for g in range(3):
         m = segments.mirrors[i, g]
@@ -374,7 +382,7 @@ def _bounds(corners, normal, segments, i, out):
 
 @njit
 def _bound(plane, rays, out, count):
-    """Writes on which side of a plane (side, place, direction) rays are (stop, and by a node's x and y)."""
+    """Write on which side of a plane (side, place, direction) rays are (stop, and dependence on a node's x and y)."""
     side, place, direction = plane
     stop, x, y = rays
     out[count] = side * dot(minus(stop, place), direction), side * dot(x, direction), side * dot(y, direction)

@@ -1,4 +1,4 @@
-"""Isometries of the world, 3 x 4, matrix and offset in m: reflections, half turns, rigid motions, their products."""
+"""Isometries of the world as 3 x 4, matrix and offset in m: reflections, half turns, rigid motions, their products."""
 
 import numpy as np
 from jaxtyping import Float
@@ -12,11 +12,11 @@ def after(second: Float[np.ndarray, "*n 3 4"], first: Float[np.ndarray, "*m 3 4"
 
 
 def image(isometry: Float[np.ndarray, "*n 3 4"], place: Float[np.ndarray, "*m 3"]) -> Float[np.ndarray, "*k 3"]:
-    """Where places (m) are taken."""
+    """Apply an isometry to places (m)."""
     return np.einsum("...ij,...j->...i", isometry[..., :3], place) + isometry[..., 3]
 
 
 def inverse(isometry: Float[np.ndarray, "*n 3 4"]) -> Float[np.ndarray, "*n 3 4"]:
-    """What undoes it: of a chain of mirrors, the chain taken the other way round."""
+    """Inverse isometry; for a chain of mirrors, the chain in reverse order."""
     back = np.swapaxes(isometry[..., :3], -1, -2)
     return np.concatenate([back, -back @ isometry[..., 3:]], axis=-1)

@@ -1,4 +1,4 @@
-"""From the field at the antennas to ADC counts, in the order in which a receiver does it:
+"""Front end: from the field at the antennas to ADC counts, in the order of a receiver's stages:
 
     amplify     transmit power, receive gain, gain and phase of each channel
     couple      leakage from TX to RX, echoes of the mount
@@ -6,8 +6,8 @@
     mix         the image of an imperfect I/Q mixer
     convert     saturation and rounding
 
-The IF filters act on echoes, by path length, before the synthesis (`if_response`). What each step is made of is in
-`FrontEndConfig`; noise and filters live in frequency bins, where they are products.
+The IF filters act on echoes, by path length, before the synthesis (`if_response`). `FrontEndConfig` has the settings
+of each stage; noise and filters are computed in frequency bins, where filters are products.
 """
 
 from functools import cached_property
@@ -27,12 +27,12 @@ ROOM_TEMPERATURE = 290.0
 
 
 class FrontEnd:
-    """The analogue and digital front end of one board.
+    """Analogue and digital front end of one board.
 
     Args:
-        config: radar configuration; gives receive gain, transmit back-off, filter corners, sample rate.
-        settings: what the front end is made of; default: what the board's file says.
-        rng: draws what stays the same for a board: mismatch, leakage, echoes of the mount. Default: board number 0.
+        config: radar configuration; with receive gain, transmit back-off, filter corners, sample rate.
+        settings: settings of the front end; default: those of the board's file.
+        rng: random generator of a board's constants: mismatch, leakage, mount echoes. Default: board number 0.
 
     Attributes:
         channel: complex gain of each channel.

@@ -7,9 +7,9 @@ from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
-#: Path types in the order of their numbers.
+#: Names of the path types in the order of their numbers.
 TYPES = tuple(p.name.lower() for p in PathType)
-#: Parts of /truth/adc_by_cause, in this order; with other radars in the scene, interference stands before leakage.
+#: Parts of /truth/adc_by_cause, in this order; in scenes with other radars, interference precedes leakage.
 PARTS = (*TYPES, "leakage")
 
 
@@ -30,7 +30,7 @@ class PathTypeCounts(Sensor):
 
 
 class AdcByPathType(Sensor):
-    """I/Q of each path type before noise and converter; parts may exceed what the converter and a float16 hold."""
+    """Noise-free I/Q of each path type before the converter; parts may exceed its range and that of a float16."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)

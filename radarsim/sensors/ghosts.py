@@ -1,11 +1,13 @@
 """Path type of each cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, moving objects.
 
-The map of each path type is that of `radarize.signal.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its
-part of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the
-window's transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the
-burst's loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise,
-converter and channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close
-faster than `RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
+The map of each path type equals `radarize.signal.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part
+of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the
+window's transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; a few
+instants
+of the burst suffice, because the map sums over Doppler, which equals the mean over loops. Left out are noise,
+converter,
+channel mismatch (which calibration removes), and the smear over azimuth of echoes whose closing speed exceeds
+`RadarConfig.max_velocity`, whose delays between transmitters the map compensates at the wrong speed.
 """
 
 from typing import NamedTuple
@@ -29,14 +31,14 @@ from radarsim.sensors.sensor import Sensor
 _INSTANTS = 3
 #: Half width of the window's transform, bins, and its table's entries per bin.
 _WIDTH, _FINE = 4, 64
-#: Powers are kept in steps of so many dB, and not below so many dB under the noise: that is what lets them be packed.
+#: Step and lowest level of stored powers, dB and dB below the noise: rounded values compress better.
 STEP, DEPTH = 0.25, 10.0
-#: Label of cells in which the echoes do not reach the noise.
+#: Label of cells in which no echo reaches the noise.
 NOISE = 255
 
 
 class Ghosts(Sensor):
-    """Power by path type on the radar's range bins and the scan's bearings, and the strongest type of every cell."""
+    """Power by path type on the radar's range bins and the scan's bearings, and the strongest type of each cell."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -73,7 +75,7 @@ class Ghosts(Sensor):
         return {"truth/cause_power": STEP * np.rint(level / STEP), "truth/cause": np.stack(cause)}
 
     def label(self, power: Float[np.ndarray, "type range azimuth"]) -> UInt8[np.ndarray, "range azimuth"]:
-        """Index into `PARTS` of the strongest one, leakage among them, or `NOISE`."""
+        """Index into `PARTS` of the strongest part, leakage included, or `NOISE`."""
         every = np.concatenate([power, self._leakage[None]])
         return np.where(every.sum(axis=0) > 10 ** (self._floor / 10), every.argmax(axis=0), NOISE).astype(np.uint8)
 
@@ -84,10 +86,10 @@ class _Tones(NamedTuple):
     Attributes:
         row: antennas.
         instants: of the burst, -1...1.
-        kernel: of a tone between two bins.
+        kernel: window transform of a tone between two bins.
         per_metre, per_rate: bins by path length and by its change over half a burst.
-        wavenumber: cycles by metre.
-        video: cycles by square metre of the residual video phase.
+        wavenumber: cycles per metre.
+        video: cycles per square metre of the residual video phase.
     """
 
     row: Int[np.ndarray, "antenna"]
@@ -122,7 +124,7 @@ class PathTypeMaps:
         offset = np.arange(-_WIDTH * _FINE, _WIDTH * _FINE + 1) / _FINE
         turns = np.cos(2 * np.pi * offset[:, None] * (np.arange(n) - (n - 1) / 2) / n)
         kernel = (turns @ window / window.sum()).astype(np.float32)
-        # Loops count by the square of their weight: instants that split it evenly stand for all of them.
+        # Loops are weighted by the square of the window: a few instants at equal parts of this weight represent them.
         share = np.cumsum(np.hamming(max(config.loops, 2)) ** 2)
         even = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
         instants = np.interp(even, share / share[-1], np.linspace(-1, 1, len(share)))

@@ -1,4 +1,4 @@
-"""Exact pose and velocity of the radar in the middle of every burst."""
+"""Exact pose and velocity of the radar at the centre of every burst."""
 
 import numpy as np
 

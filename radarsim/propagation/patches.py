@@ -323,7 +323,7 @@ def _hidden(mesh, corner, turn, way):
 
 @njit
 def _units(place, zones, way):
-    """Offset from the specular point in Fresnel units: direction as over its quadric, length from the path difference."""
+    """Offset from the specular point in Fresnel units: direction on its quadric, length by path difference."""
     middle, first, second, elliptic, _ = zones
     one, two, least, wavelength = way
     offset = minus(place, middle)

@@ -233,7 +233,7 @@ class FrontEnd:
     def _image(
         self, bins: Complex[np.ndarray, "*trace sample"], rejection: float
     ) -> Complex[np.ndarray, "*trace sample"]:
-        """Image of bin b at -b, so many dB down, as far as the decimation filter lets it through; -b is bin N - b."""
+        """Image of bin b at -b, `rejection` dB below it, within the decimation filter's band; -b is bin N - b."""
         passed = 10 ** (-rejection / 20) * self._decimation(-self._bins)
         # conj(x(t)) has the conjugate coefficients in mirrored order
         image = np.zeros_like(bins)

@@ -79,7 +79,7 @@ def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
         fake(name).make(tmp_path, lambda done, total: None)
     before = made(tmp_path)
     longer = FakeSpecification(fake("a"), fake("b", frames=5))
-    with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings anew"):
+    with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings again"):
         make(longer, tmp_path)
     assert made(tmp_path) == before
     outcome = make(longer, tmp_path, workers=1, replace=True, log=lambda line: None)
@@ -123,7 +123,7 @@ def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(run, "perform", interrupted)
-    with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command goes on"):
+    with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command continues"):
         make(FakeSpecification(fake("a"), fake("b")), tmp_path, log=lambda line: None)
     assert list(made(tmp_path)) == ["b.h5.part"]  # to go on from
 

@@ -62,5 +62,5 @@ def test_none_is_none_and_a_full_room_is_told(walk):
     floor = {"name": "floor", "shape": "rectangle", "size": [2.2, 2.2], "facing": [0, 0, 1], "material": "concrete"}
     cell = Scene.of({"objects": [floor]}, "cell")
     to_and_fro = Walk("handheld", 2.0, waypoints=np.array([[0.0, 0.0], [0.1, 0.0]])).through(cell, 0)
-    with pytest.raises(InputError, match="scene cell: has room for 0 people beside the radar's way, expected 2"):
+    with pytest.raises(InputError, match="scene cell: has room for 0 people beside the radar's path, expected 2"):
         with_pedestrians(cell, to_and_fro, 2, 0)

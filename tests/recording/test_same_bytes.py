@@ -215,7 +215,7 @@ def test_a_data_set_that_was_killed(specification, maps, tmp_path, capsys):
         run(app, "radarsim", typed)
     said = capsys.readouterr()
     assert ended.value.code == 0, said.err
-    assert "1 recordings made, 1 were there" in said.out and f"{second.stem}: " in said.out
+    assert "1 recordings made, 1 already there" in said.out and f"{second.stem}: " in said.out
     assert first.stat().st_mtime_ns == stamp
     same(tmp_path, maps)
 

@@ -58,7 +58,7 @@ def test_it_is_said_before(tmp_path):
     assert effort(PRESET, 10) == "" and together(PRESET) == 16
     assert together(LARGEST) * LARGEST.frame_bytes <= 32 << 20
     times = 1024 * 255 / 96 / 32
-    assert f"holds {times:.1f} times the samples" in effort(LARGEST, 3) and "each of the 3 " in effort(LARGEST, 3)
+    assert f"has {times:.1f} times the samples" in effort(LARGEST, 3) and "each of the 3 " in effort(LARGEST, 3)
     path, large = tmp_path / "large.h5", PRESET.model_copy(update={"loops": 128, "frame_period": 0.2})
     with RecordingWriter(path, large) as writer:
         noise = np.random.default_rng(0).integers(-200, 200, (2, *large.frame_shape))

@@ -38,7 +38,7 @@ def test_a_closed_box_is_a_room(tmp_path, inwards):
     """One can walk in it, and its wall echoes as an endless plane of concrete does."""
     done = brought(tmp_path, inside_out(ROOM) if inwards else ROOM)
     assert [row.material for row in done.rows] == ["concrete"]
-    assert any("taken for a room" in remark for remark in done.remarks) != inwards
+    assert any("treated as a room" in remark for remark in done.remarks) != inwards
     scene = Scene.load(done.path)
     motion = plan_motion(scene, "handheld", 3.0, np.random.default_rng(0))
     assert isinstance(motion, Motion)
@@ -93,7 +93,7 @@ def test_the_mesh_says_which_way_is_up(tmp_path, suffix, up, place, why):
     lying(place, up).export(tmp_path / f"place.{suffix}")
     done = import_scene(tmp_path / f"place.{suffix}", tmp_path / "out", Options(units="m"))
     assert np.ptp(Scene.load(done.path).bounds, axis=0) == pytest.approx(np.ptp(place.bounds, axis=0), abs=1e-5)
-    assert any(f"{up} is taken for up" in remark and why in remark for remark in done.remarks)
+    assert any(f"{up} is taken as up" in remark and why in remark for remark in done.remarks)
     other = import_scene(
         tmp_path / f"place.{suffix}", tmp_path / "other", Options(units="m", up="z" if up == "y" else "y")
     )
@@ -106,7 +106,7 @@ def test_where_the_mesh_says_nothing_the_format_does(tmp_path):
     for suffix, up in (("obj", "z"), ("glb", "y")):
         cube.export(tmp_path / f"cube.{suffix}")
         remarks = import_scene(tmp_path / f"cube.{suffix}", tmp_path / suffix).remarks
-        assert any(f"{up} is taken for up (usual" in remark for remark in remarks)
+        assert any(f"{up} is taken as up (usual" in remark for remark in remarks)
 
 
 def test_a_scene_without_echoes_is_refused(tmp_path, capsys):
@@ -136,7 +136,7 @@ def test_a_room_without_a_floor_gets_one(tmp_path, table):
     meshes = [walls_of_a_room(), shapes.box((3, 2, 2.65), (6.2, 4.2, 0.1))]
     done = brought(tmp_path, *meshes, *([shapes.box((1, 1, 0.75), (1.2, 0.6, 0.05))] if table else []))
     assert not any("moved by" in remark for remark in done.remarks)
-    assert any("has a ceiling 2." in remark and "no floor: one is put there" in remark for remark in done.remarks)
+    assert any("has a ceiling 2." in remark and "no floor: a floor is added" in remark for remark in done.remarks)
     scene = Scene.load(done.path)
     assert ground_level(scene) == 0 and scene.bounds[1, 2] == pytest.approx(2.7)
     motion = plan_motion(scene, "handheld", 3.0, np.random.default_rng(0))

@@ -12,7 +12,7 @@ import pytest
 
 @contextmanager
 def disk(folder: Path, size: int, image: Path | None = None) -> Iterator[Path]:
-    """A file system of so many kiB, in a file or in memory, where root can mount one."""
+    """A file system of a given size in KiB, in a file or in memory, if root can mount one."""
     folder.mkdir()
     if image is None:
         mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", folder]

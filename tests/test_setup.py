@@ -84,7 +84,7 @@ def test_what_tests_and_benchmarks_import_is_declared():
 
 
 def test_every_extras_modules_are_known():
-    """So that a command that misses one says which extra it is of."""
+    """Commands with a missing package name its extra."""
     for extra, modules in EXTRAS.items():
         declared = names(*PROJECT["optional-dependencies"][extra]) - names(*PROJECT["dependencies"])
         assert all(declared & distributions({module}) for module in modules)
@@ -137,9 +137,9 @@ def test_a_second_setup_does_nothing():
 
 
 def test_what_is_imported_stays_compiled_though_the_shell_forbids_it():
-    told = ["make", "-sC", ROOT, "--eval", "told: ; @echo $${PYTHONDONTWRITEBYTECODE-nothing}", "told"]
+    shown = ["make", "-sC", ROOT, "--eval", "shown: ; @echo $${PYTHONDONTWRITEBYTECODE-nothing}", "shown"]
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    assert subprocess.run(told, env=environment, capture_output=True, text=True).stdout == "nothing\n"
+    assert subprocess.run(shown, env=environment, capture_output=True, text=True).stdout == "nothing\n"
     assert "\nunset PYTHONDONTWRITEBYTECODE\n" in (ROOT / "setup.sh").read_text()
 
 

@@ -80,7 +80,7 @@ def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulato
     with Emulator(
         Playback(source) if isinstance(source, Path) else source,
         addresses=Addresses(where.dca, where.host, where.command_port, where.data_port),
-        **{"say": lambda words: None} | options,
+        **{"log": lambda words: None} | options,
     ) as emulator:
         while not emulator.ready:
             time.sleep(0.02)

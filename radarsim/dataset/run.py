@@ -133,7 +133,9 @@ def _examine(tasks: tuple[Task, ...], folder: Path, replace: bool) -> list[Task]
             stale.append(str(error))
     if stale and not replace:
         others = f" (and {len(stale) - 1} more)" if len(stale) > 1 else ""
-        raise InputError(f"{folder}: {stale[0]}{others}; --replace makes them again, another folder keeps them")
+        raise InputError(
+            f"{folder}: {stale[0]}{others}; --replace makes such recordings again, another folder keeps them"
+        )
     return finished
 
 

@@ -63,7 +63,7 @@ def test_a_gap_is_believed_when_several_packets_agree():
 
 
 def test_nothing_is_further_than_the_radar_can_have_come(monkeypatch):
-    """Six packets 12 s ahead agree in a pause of the stream; the clock says that they cannot be."""
+    """Six packets 12 s ahead agree in a pause of the stream; the clock excludes them."""
     origin = Origin("board", SMALL)
     frames, now = [], 0.0
     monkeypatch.setattr(receiver, "time", SimpleNamespace(monotonic=lambda: now))

@@ -121,12 +121,12 @@ def test_a_disk_that_stays_full(tmp_path, monkeypatch):
     """Not even its end can be written: what is left is named, and can be rescued later."""
     free = [None] * 3  # for the first frames
 
-    def claim(*_):
+    def allocate(*_):
         if not free:
             raise OSError(errno.ENOSPC, "No space left on device")
         free.pop()
 
-    monkeypatch.setattr(writer_module.os, "posix_fallocate", claim)
+    monkeypatch.setattr(writer_module.os, "posix_fallocate", allocate)
     monkeypatch.setattr(record_module, "PATIENCE", 0.0)
     with pytest.raises(InputError, match=r"no space left.*kept in .*a.h5.part, of which radarize recover .*a.h5.part"):
         captured(tmp_path / "a.h5")
@@ -216,7 +216,7 @@ def test_what_was_captured_is_not_replaced_unasked(tmp_path):
     for path, hint in ((tmp_path / "a.h5", "expected another name"), (tmp_path / "b.h5", "radarize recover")):
         with pytest.raises(InputError, match=f"{path.name}.*is there already.*{hint}"):
             captured(path, Played(frames=4))
-        with pytest.raises(InputError, match="is there already"):  # by a simulation, say
+        with pytest.raises(InputError, match="is there already"):  # such as a simulation
             RecordingWriter(path, SMALL)
     assert (tmp_path / "a.h5").read_bytes() == before and left.exists()
     captured(tmp_path / "a.h5", Played(frames=4), overwrite=True)

@@ -114,7 +114,7 @@ def test_silence_is_explained():
 
 
 def test_calibration_data_may_be_unknown():
-    """Old firmware knows no calibData; everything else must be taken."""
+    """Old firmware rejects calibData as unknown; everything else must be accepted."""
 
     def old(line: bytes) -> bytes:
         known = b"Done" if not line.startswith(b"calibData") else b"'calibData' is not recognized as a CLI command"

@@ -180,13 +180,13 @@ def test_the_plan_is_printed(tmp_path, capsys, monkeypatch):
     path = hall.write(tmp_path, randomise=SOME, recordings=hall.recordings(["cart", "robot"]))
     with pytest.raises(SystemExit) as ended:
         run(app, "radarsim", ["dataset", str(path), "--plan"])
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     assert ended.value.code == 0 and sorted(p.name for p in tmp_path.iterdir()) == [
         "hall.yaml",
         "small.cfg",
         "tiny.yaml",
     ]
-    lines = [" ".join(line.split()) for line in said.splitlines()]
+    lines = [" ".join(line.split()) for line in printed.splitlines()]
     for line in (
         "clutter all uniform 0.8, 1.2",
         "pitch all normal 4, 1",

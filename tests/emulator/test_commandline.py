@@ -1,4 +1,4 @@
-"""The firmware's words: what is right, what is refused and when."""
+"""Firmware command line: accepted and refused commands, and their messages."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""`radarsim emulate` in a process: a client that knows nothing of this project, our own, and what users mistype."""
+"""`radarsim emulate` in a process: with a foreign client, with `radarize capture`, and with wrong arguments."""
 
 import os
 import subprocess

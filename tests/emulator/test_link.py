@@ -1,4 +1,4 @@
-"""The board's packets and their times, against the standard and a real capture; what a network does to them."""
+"""Packets of the emulated board and their times, against the standard and a real capture; network faults."""
 
 from collections import Counter
 
@@ -19,7 +19,7 @@ from tests.virtual import CONFIG
 
 
 class Wire:
-    """A clock that moves when somebody sleeps, and what was sent when."""
+    """Fake clock that advances in sleep, and a log of what was sent when."""
 
     def __init__(self, disturbance: Disturbance | None = None):
         self.now = 0.0

@@ -1,4 +1,4 @@
-"""The virtual DCA1000's answers to requests from outside."""
+"""Replies of the virtual DCA1000 to requests."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""The virtual radar's samples: each of them, when it is due, with the configuration of its commands."""
+"""Samples of the virtual radar: values, timing, and configuration."""
 
 import errno
 import select
@@ -25,7 +25,7 @@ from tests.virtual import CONFIG, record
 
 
 def test_a_capture_by_hand(playing):
-    """Every byte; the last packet 2 s late, then the status: as the real board does it."""
+    """Every byte; the last packet is 2 s late, followed by the status, as on the real board."""
     client, adc, lines = playing
     client.record()
     assert all("Error" not in answer for answer in client.configure(SMALL))
@@ -37,9 +37,9 @@ def test_a_capture_by_hand(playing):
     assert received == [packet.encode() for packet in packets(encode(adc, SMALL).tobytes())]
     assert any("end of the source; 12 frames sent" in line for line in lines)
     # Once more: the recording starts again, and so do the counts; this time the client stops.
-    client.say("sensorStop")
+    client.command("sensorStop")
     client.record()
-    client.say("sensorStart 0")
+    client.command("sensorStart 0")
     again = [client.data.recv(2048) for _ in range(10)]
     assert again == received[:10]
     assert client.ask(Opcode.STOP) == Reply(Opcode.STOP, 0)
@@ -59,7 +59,7 @@ def test_a_number_of_frames(playing):
     client, _, _ = playing
     client.record()
     for line in write_cfg(SMALL).splitlines():
-        client.say(line.replace(" 4 0 20 1 0", " 4 3 20 1 0"))
+        client.command(line.replace(" 4 0 20 1 0", " 4 3 20 1 0"))
     assert len(client.packets()) == 3 * SMALL.frame_bytes // 1456
 
 
@@ -77,7 +77,7 @@ def test_frames_keep_their_period_and_chirps_theirs(tmp_path):
     chirp = within // (CONFIG.frame_bytes // 96)
     due = frame * CONFIG.frame_period + (chirp + 1) * CONFIG.chirp_time
     behind = np.array(arrivals) - due
-    # A busy machine holds packets up, but none is early: the most punctual ones of each quarter tell the radar's clock,
+    # A busy machine holds packets up, but none is early: the earliest ones of each quarter give the radar's clock,
     quarters = behind[: len(behind) // 4 * 4].reshape(4, -1).min(axis=1)
     assert np.ptp(quarters) < 5e-3 + slipped
     # and those of each chirp its place in the burst: spread over the period, the last would be 31 ms late.
@@ -93,7 +93,7 @@ def test_sensor_stop_ends_with_a_whole_frame(tmp_path):
         client.configure(CONFIG)
         for _ in range(7 * CONFIG.frame_bytes // 1456):  # more frames than there are: it loops
             client.data.recv(2048)
-        assert client.say("sensorStop").endswith("sensorStop\nDone\n\r" + PROMPT)
+        assert client.command("sensorStop").endswith("sensorStop\nDone\n\r" + PROMPT)
         frames = emulator.frames
         client.ask(Opcode.STOP)
         time.sleep(0.1)
@@ -137,7 +137,7 @@ def test_2500_packets_through_a_bad_network(tmp_path):
         received = []
         while emulator.link.packets < 2_600:
             received += client.packets(silence=0.005)
-        client.say("sensorStop")
+        client.command("sensorStop")
         client.ask(Opcode.STOP)
         received += client.packets()
         count = emulator.frames
@@ -187,7 +187,7 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
 
 
 class Cut:
-    """A socket whose cable is unplugged."""
+    """A socket that fails as if its cable were unplugged."""
 
     def sendto(self, *_: object) -> None:
         raise OSError(errno.ENETUNREACH, "Network is unreachable")
@@ -207,7 +207,7 @@ def test_an_unplugged_cable_loses_packets_and_stops_nothing(tmp_path, monkeypatc
             client.commands.sendto(Request(Opcode.ALIVE).encode(), client.board)  # whose reply is lost
             time.sleep(0.1)
         assert select.select([client.data], [], [], 5)[0]  # plugged in again
-        assert "Done" in client.say("sensorStop")
+        assert "Done" in client.command("sensorStop")
         assert client.ask(Opcode.ALIVE) == Reply(Opcode.ALIVE, 0)
         assert sum("are lost (Network is unreachable)" in line for line in lines) == 1
 

@@ -136,7 +136,7 @@ def network_capture() -> Reader:
 
 
 def raw_words() -> Reader:
-    """A .bin, with settings by hand that need not fit it."""
+    """A .bin, with given settings that need not fit it."""
     seed = encode(FRAMES, CONFIG).tobytes()
     count = st.one_of(st.integers(-1, 300), st.sampled_from((0, 65535, 10**6, 2**31, 2**64)))
     given = st.fixed_dictionaries(

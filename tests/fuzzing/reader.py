@@ -18,8 +18,7 @@ from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
-#: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the
-#: input's.
+#: Largest processor time (s) and memory (bytes) of a reader: fixed buffers plus `MOST_TIMES` times the input.
 MOST_SECONDS, MOST_MEMORY, MOST_TIMES = 5.0, 96 << 20, 20
 #: 3,072 bytes a frame.
 CONFIG = RadarConfig(

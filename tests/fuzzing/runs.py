@@ -27,7 +27,7 @@ from tests.fuzzing.reader import Reader, file
 
 @functools.cache
 def sound_run() -> dict[str, bytes]:
-    """The files of a run that knows the truth."""
+    """Files of a run with ground truth."""
     with tempfile.TemporaryDirectory() as name:
         folder = write_run(Path(name) / "RUN", walked=2.0)
         run = RunFolder(folder)

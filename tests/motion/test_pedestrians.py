@@ -1,4 +1,4 @@
-"""People about: in the radar's view, not in its way, and not in walls."""
+"""Pedestrians: in the radar's view, not on its path, and not in walls."""
 
 import numpy as np
 import pytest

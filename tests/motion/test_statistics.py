@@ -1,4 +1,4 @@
-"""Statistics of motions that can be worked out by hand."""
+"""Statistics of motions against values calculated manually."""
 
 import numpy as np
 import pytest

@@ -122,7 +122,7 @@ def test_hand_faces_other_ways_and_wheels_follow_their_line(tours):
     assert 0.3 < (hand < 30).mean() < 0.9 and (hand > 60).mean() > 0.05
     for platform in ("cart", "robot"):
         wheels = np.concatenate([angles(tours[platform, s]) for s in SEEDS])
-        # Ahead or straight back, and ahead for most of the time: by cart 0.5 to 1.0 of a tour, 0.8 on average.
+        # Ahead or straight back, and ahead for most of the time: for the cart 0.5 to 1.0 of a tour, 0.8 on average.
         assert np.minimum(wheels, 180 - wheels).max() < 35
         assert (wheels < 35).mean() > 0.5
 

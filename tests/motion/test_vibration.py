@@ -56,8 +56,8 @@ def test_spectrum_is_a_floors():
 def test_axes_and_seeds_are_independent():
     first, second = shaken(1.0, WHEELS, 1), shaken(1.0, WHEELS, 2)
     assert np.array_equal(first, shaken(1.0, WHEELS, 1))
-    alike = np.corrcoef(np.concatenate([first, second], axis=1).T) - np.eye(6)
-    assert np.abs(alike).max() < 0.15
+    correlation = np.corrcoef(np.concatenate([first, second], axis=1).T) - np.eye(6)
+    assert np.abs(correlation).max() < 0.15
 
 
 @pytest.mark.parametrize("platform", list(PLATFORMS))

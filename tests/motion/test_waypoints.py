@@ -1,4 +1,4 @@
-"""Walks through way-points, and what is wrong with way-points, in a sentence."""
+"""Walks through way-points, and error messages for unusable way-points."""
 
 import numpy as np
 import pytest

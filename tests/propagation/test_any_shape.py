@@ -1,4 +1,4 @@
-"""Whatever shape stands in a scene, however thin and however turned, is covered by plates and can be simulated."""
+"""Meshes of any shape and orientation, thin ones included, are covered by plates and can be simulated."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ bodies = st.one_of(
 
 
 def flat_area(mesh):
-    """Of all regions that are neither curved nor below a wavelength's square, m^2."""
+    """Area of all regions that are neither curved nor below a squared wavelength, m^2."""
     _, is_round = recognise(mesh)
     _, is_curved = pieces(mesh, ~is_round, SMALLEST)
     if (is_round | is_curved).all():
@@ -46,7 +46,7 @@ def flat_area(mesh):
 
 
 def area(corners):
-    """Of quadrilaterals, m^2: half the cross product of the diagonals."""
+    """Areas of quadrilaterals, m^2: half the cross product of the diagonals."""
     return np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1).sum() / 2
 
 

@@ -1,4 +1,4 @@
-"""Echoes by mirrors alone, against rays shot into the office: which corners are there, and how strong."""
+"""Echoes over mirrors only, against rays shot into the office: existence and strength of corner reflections."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def office():
 
 
 def by_chains(office, position, axis, spread, bounces):
-    """Amplitude of all chains of so many mirrors that leave within a fan, weighted as its rays are."""
+    """Amplitude of all chains of a number of mirrors within a fan, weighted like its rays."""
     scene, reflectors = office
     level = axis * [1, 1, 0] / np.hypot(axis[0], axis[1])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))

@@ -1,4 +1,4 @@
-"""Small things as points: how many, how strong, and that they are of the world."""
+"""Clutter points: number, strength, and that they are fixed in the world."""
 
 import numpy as np
 import pytest
@@ -79,8 +79,9 @@ def sphere(steps=45):
 
 
 def scattered(points, normal, source):
-    """Share of what falls from `source` on the square that its points scatter: their bistatic cross sections over 4 pi,
-    integrated over the sphere. All have one pattern but for their size."""
+    """Fraction of the power from `source` on the square that its points scatter: their bistatic cross sections over 4
+    pi,
+    integrated over the sphere. All points have the same pattern up to a factor."""
     for column in (points.normal, points.lobe, points.two_sided):
         assert np.all(column == column[0])
     face, lobe, two_sided = points.normal[0], points.lobe[0], points.two_sided[0]
@@ -185,7 +186,7 @@ def test_hidden_things_are_not_seen():
 
 
 def test_none_at_level_nought():
-    """A scene of level 0 has the scatterers of its surfaces, drawn as without clutter."""
+    """A scene of level 0 has only the scatterers of its surfaces, the same as without clutter."""
     scene = room(0.0)
     rng = np.random.default_rng(0)
     both = Cluttered(Surface(scene, rng), Clutter(scene, rng), Detours.of(scene, CONFIG, rng))
@@ -230,7 +231,7 @@ def test_no_surface_gives_more_than_falls_on_it(kind, level):
         shares.append(small)
         by_structure = small * STRUCTURE / of_things
         assert np.mean(np.abs(gamma_) ** 2) + diffuse + small + by_structure + passed <= 1
-        # what is scattered is taken from the mirror, the rough surface and what passes alike
+        # scattered power is taken in equal parts from specular, diffuse and transmitted power
         taken = 1 - np.mean(np.abs(gamma_) ** 2) / np.mean(np.abs(np.array(mirror(plain.layer[0], np.cos(angle)))) ** 2)
         expected = taken * of_things / (of_things + STRUCTURE)
         assert small == pytest.approx(expected, rel=4 * spread / np.sqrt(max(len(things), 1)))

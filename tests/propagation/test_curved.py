@@ -109,7 +109,7 @@ HALF = (CONFIG.chirp_times.max() - CONFIG.chirp_times.min()) / 2
 
 
 def shortest(place, one, two):
-    """Of ways between two places over the points of a surface, by two parameters from nought on, m."""
+    """Shortest of the paths between two places over a surface given by two parameters from zero on, m."""
 
     def way(x):
         point = place(x)
@@ -159,8 +159,8 @@ def test_what_is_round():
     egg.vertices[:, 2] *= 1.2
     for mesh in (box, prism, egg):
         assert not recognise(mesh)[0]
-    legs = [shapes.placed(shapes.cylinder((x, 0, 0), 0.03, 0.7, 10), rotation=(0.3, 0.2, 0)) for x in (0, 1)]
-    bodies, taken = recognise(shapes.joined(*legs, shapes.placed(ball, (0, 3, 0)), shapes.placed(box, (5, 0, 0))))
+    poles = [shapes.placed(shapes.cylinder((x, 0, 0), 0.03, 0.7, 10), rotation=(0.3, 0.2, 0)) for x in (0, 1)]
+    bodies, taken = recognise(shapes.joined(*poles, shapes.placed(ball, (0, 3, 0)), shapes.placed(box, (5, 0, 0))))
     assert sorted(round(b.radius, 6) for b in bodies) == [0.03, 0.03, 0.1]
     assert taken.sum() == 2 * 20 + len(ball.faces)
     assert max(b.half for b in bodies) == pytest.approx(0.35)

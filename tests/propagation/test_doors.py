@@ -1,4 +1,4 @@
-"""Doors that move echo like doors that stand: flash, mirror, let through; and what moves with them moves in phase."""
+"""Moving doors reflect, mirror and transmit like static doors, and paths over them move with the right phase."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ HERE, AHEAD = np.zeros(3), np.eye(3)
 
 
 def standing(angle, material="wood"):
-    """The same leaf as a thing that stands."""
+    """The same leaf as a static object."""
     turn = np.deg2rad(angle)
     center = HINGE + WIDTH / 2 * np.array([np.cos(turn), np.sin(turn), 0])
     leaf = shapes.placed(shapes.box((0, 0, 0), (WIDTH, THICKNESS, HEIGHT)), center, (0, 0, turn))
@@ -47,14 +47,14 @@ def standing(angle, material="wood"):
 
 
 def both(angle, things=(), surface=NOTHING, material="wood"):
-    """Echoes of a door that stands, and of one that moves but not now."""
+    """Echoes of a static door, and of a moving one at the same position."""
     stands = finder([standing(angle, material), *things], surface=surface)
     moves = finder(things, [door(angle, material)], surface)
     return stands(HERE, AHEAD), moves(HERE, AHEAD)
 
 
 def same(found, truth):
-    """Whether two lots of echoes are as strong, in phase and in number."""
+    """Whether two sets of echoes are equal in strength, phase and number."""
     order = [np.lexsort((e.amplitude.imag.round(9), e.amplitude.real.round(9))) for e in (found, truth)]
     size = np.abs(truth.amplitude).max()
     return len(found) == len(truth) and np.allclose(
@@ -63,7 +63,7 @@ def same(found, truth):
 
 
 @pytest.mark.parametrize("angle", [90.0, 91.5, 84.0, 60.0, 20.0])
-def test_a_door_flashes_as_if_it_stood(angle):
+def test_a_door_reflects_as_if_it_stood(angle):
     """Faces, edges and corners: the same field, power and phase, at any angle."""
     stands, moves = both(angle)
     truth, found = (field(e, HERE, LAMBDA) for e in (stands, moves))
@@ -74,7 +74,7 @@ def test_a_door_flashes_as_if_it_stood(angle):
 
 @pytest.mark.parametrize("angle", [90.0, 70.0, 45.0, 10.0])
 def test_a_door_scatters_no_more_than_if_it_stood(angle):
-    """Mean power of what is not a flash."""
+    """Mean power of diffuse echoes."""
     scene = Scene("door", [standing(angle)])
     powers = []
     for seed in range(4):
@@ -92,7 +92,7 @@ WALL = SceneObject("wall", shapes.rectangle((4.0, 0.0, 0), (6.0, 3.0), (-1, 0, 0
 
 @pytest.mark.parametrize(("angle", "material"), [(90.0, "wood"), (75.0, "wood"), (90.0, "glass"), (0.0, "wood")])
 def test_what_is_behind_a_door(angle, material):
-    """A point and a wall: weakened and delayed as by a slab that stands; beside an open door, they are as they were."""
+    """A point and a wall: attenuated and delayed as by a static slab; unchanged beside an open door."""
     point = Scatterers.points(np.array([[3.0, 0.1, 0.2]]), np.ones(1))
     stands, moves = both(angle, [WALL], point, material)
     truth, found = (e.where(through=bool(angle), bounces=0, moving=False) for e in (stands, moves))
@@ -111,7 +111,7 @@ SIDE = SceneObject("side", shapes.rectangle((1.5, 1.5, 0), (6.0, 3.0), (0, -1, 0
 
 
 def test_a_lamp_is_seen_over_a_door():
-    """Over its face on one way and on both: as over one that stands."""
+    """Over its face on one path and on both: as over a static door."""
     stands, moves = both(60.0, [LAMP])
     truth = [stands.where(bounces=n, through=False) for n in (1, 2)]
     assert [len(e.points) for e in truth] == [2, 1]
@@ -144,12 +144,12 @@ def reflection(mover, t):
 TX, RX = tx_positions(CONFIG), rx_positions(CONFIG)
 
 
-def test_a_flash_moves_as_the_door_does():
+def test_its_reflection_moves_as_the_door_does():
     """Its path, antenna by antenna, at the burst's ends and in its middle; its speed is that of the foot, twice."""
     mover = swinging(90.0)
     echoes = finder([], [mover])(HERE, AHEAD, MIDDLE)
-    flash = np.abs(echoes.amplitude).argmax()
-    found = lengths(echoes)[flash]
+    strongest = np.abs(echoes.amplitude).argmax()
+    found = lengths(echoes)[strongest]
     late = lag(as_slab(standing(90.0))[0], CONFIG)
     assert abs(late) > 1e-4
     for k, s in enumerate(INSTANTS):

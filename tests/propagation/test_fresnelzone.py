@@ -1,4 +1,4 @@
-"""What stands in the first Fresnel zones of a flash or a chain: Kirchhoff's integral, and no steps."""
+"""Obstacles in the first Fresnel zones of specular reflections and chains: Kirchhoff's integral, and no steps."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,8 @@ WEDGE = [
 
 
 def test_a_pole_before_a_wall():
-    """In steps of 6 mm over its zones, where one ray went from 0 to -106 dB."""
+    """A pole in front of a wall, in steps of 6 mm over its zones, in which a single ray would jump from 0 to -106
+    dB."""
     truth, found = wall_past_pole()
     middle = np.abs(OFFSETS) < 0.032
     assert truth[middle].max() < -2 and truth.min() > -4
@@ -45,7 +46,7 @@ def test_a_pole_however_it_leans(tilt):
 
 @pytest.mark.parametrize("offset", [0.0, 0.012, 0.024])
 def test_a_pole_within_a_chain(offset):
-    """Between the sides of a wedge, where the way is 2.5 m long if it is unfolded."""
+    """A pole between the sides of a wedge, on a path of 2.5 m when unfolded."""
     foot, normal = np.array([3.0, -0.5]), np.array([-RISE, -SLOPE])
     place = np.array([2.5, offset])
     x, y = place - 2 * np.dot(place - foot, normal) * normal
@@ -54,7 +55,7 @@ def test_a_pole_within_a_chain(offset):
 
 
 def board(x, y):
-    """A screen beside the way that leaves it clear up to y, m; negative: it hides the way."""
+    """A screen beside the path that leaves it clear up to y, m; negative: it blocks the path."""
     return SceneObject("board", shapes.rectangle((x, y + 0.5, 0), (1.0, 3.0), (-1, 0, 0)), MATERIALS["metal"])
 
 
@@ -68,7 +69,7 @@ def test_half_a_plane_by_closed_forms():
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 1.5, 1.8])
 def test_the_shadow_of_an_edge(distance):
-    """A wall's flash, 2 m away, behind a screen at a distance: the way out and back meets two edges that are one."""
+    """A specular reflection 2 m away behind a screen: the path out and back passes two edges that coincide."""
     zone = np.sqrt(LAMBDA * distance * (4 - distance) / 8)
     offsets = np.array([-0.8, -0.5, -0.25, 0.0, 0.25, 0.5, 0.8]) * zone
     truth = [20 * np.log10(abs(past_edge(y, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
@@ -84,7 +85,7 @@ def test_an_edge_half_way(offset, level):
     assert left([WALL], [board(1.0, offset)], 4.0) == pytest.approx(level, abs=1.5)
 
 
-def test_an_edge_that_covers_the_flash_bit_by_bit():
+def test_an_edge_that_covers_the_reflection_bit_by_bit():
     """Half a plane at 1 m, from 50 mm beside the way to 50 mm over it: no step on either side."""
     steps = np.arange(-10, 11) * 0.005
     found = np.array([left([WALL], [board(1.0, -y)], 4.0) for y in steps])

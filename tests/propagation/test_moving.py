@@ -1,4 +1,4 @@
-"""Things that move: their scatterers, what they hide, and their echoes chirp by chirp."""
+"""Moving objects: their scatterers, occlusion by them, and their echoes chirp by chirp."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_occlusion_against_brute_force():
 
 
 def alone(movers, scene=None, surface=NOTHING, seed=0):
-    """A finder that sees movers, and the crowd that they are."""
+    """A finder with moving targets only, and these targets."""
     crowd = MovingTargets(movers, np.random.default_rng(seed), density=60.0)
     facets = None if scene is None else Reflectors.of(scene, CONFIG)
     return PathFinder(scene, surface, facets, CONFIG, moving=crowd), crowd
@@ -78,12 +78,12 @@ def brute_force(echoes, crowd, time, which, mirror=None):
             share = np.linspace(0, 1, samples)[:, None, None]  # straight within the 42 us of a ramp
             place = (1 - share) * ends[0] + share * ends[1]
             for r in range(n_rx):
-                legs = []
+                segments = []
                 for way, antenna in enumerate((tx[k], rx[r])):
                     image = place * [1, -1, 1] + [0, 4, 0]
                     virtual = place if mirror is None else np.where(mirror[:, way, None], image, place)
-                    legs.append(np.linalg.norm(virtual - antenna, axis=2))
-                delay = (legs[0] + legs[1]) / SPEED_OF_LIGHT
+                    segments.append(np.linalg.norm(virtual - antenna, axis=2))
+                delay = (segments[0] + segments[1]) / SPEED_OF_LIGHT
                 phase = CONFIG.center_frequency * delay + CONFIG.slope * delay * (on_ramp[:, None] - delay / 2)
                 out[loop, k, r] = (echoes.amplitude * np.exp(2j * np.pi * phase)).sum(axis=1)
     return out
@@ -117,7 +117,7 @@ def test_phases_against_brute_force(mover, below):
 
 
 def test_ghosts_of_movers_move_as_mirrored():
-    """Over a metal wall 2 m to the left: the reflected leg follows the mirrored walker."""
+    """Over a metal wall 2 m to the left: the reflected path segment follows the mirrored walker."""
     wall = Scene("wall", [SceneObject("wall", rectangle((2, 2, 0), (8, 4), (0, -1, 0)), MATERIALS["metal"])])
     finder, crowd = alone([Person(name="p", path=((2, -0.5), (2, 1.0)), speed=1.3, floor=-1.0)], wall)
     time = 0.5
@@ -139,7 +139,7 @@ def test_an_approaching_person_closes():
     lengths = echoes.lengths(CONFIG, Rig(), 1.0 - CONFIG.burst_center)
     closing = -lengths[:, 0, 1] / BurstClock.of(CONFIG).half / 2
     assert np.median(closing) == pytest.approx(1.0, abs=0.15)
-    assert np.ptp(closing) > 0.5  # arms and legs
+    assert np.ptp(closing) > 0.5  # swinging limbs
 
 
 def test_a_person_casts_a_shadow():

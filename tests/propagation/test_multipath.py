@@ -1,4 +1,4 @@
-"""Legs over mirrors and through slabs: phantoms where the image method puts them, transmission, reciprocity."""
+"""Multipath over mirrors and through slabs: ghosts where the image method puts them, transmission, reciprocity."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def finder(objects, place, **options):
 
 
 def points_of(echoes, bounces):
-    """Point echoes of one cause, and their amplitudes."""
+    """Point echoes of one path type, and their amplitudes."""
     some = echoes.where(kind=Kind.POINT, bounces=bounces, through=False)
     return some.points, some.amplitude
 
@@ -72,7 +72,7 @@ def test_phantom_in_the_heat_map(objects, place, phantom):
 
 
 def test_all_phantoms_of_a_corner():
-    """Two walls at right angles: three images of a target, and every way to go out by one and back by another."""
+    """Two walls at right angles: three images of a target, and every combination of paths out and back."""
     place = np.array([2.4, 0.5, 0.0])
     left, end = place * [1, -1, 1] + [0, 2.4, 0], place * [-1, 1, 1] + [6.0, 0, 0]
     both = np.array([end[0], left[1], 0.0])
@@ -87,7 +87,7 @@ def test_all_phantoms_of_a_corner():
     for e in known:
         here = np.linalg.norm(places - e, axis=1) < 1e-6
         assert here.any()
-        # radar equation over both legs; conductors reflect all, so only antenna and distance count
+        # radar equation over both path segments; conductors reflect all power, so only antenna and distance count
         gain = [amplitude_gain(*q, ELEMENT) / np.linalg.norm(q) for q in (e[:3], e[3:])]
         truth = LAMBDA / (4 * np.pi) ** 1.5 * gain[0] * gain[1]
         assert 20 * np.log10(abs(amplitude[here].sum()) / truth) == pytest.approx(0, abs=0.2)
@@ -178,7 +178,7 @@ def test_delays_are_those_of_unwrapped_phases(name):
 
 
 @pytest.mark.parametrize("closed", [False, True], ids=["sheet", "closed body"])
-def test_a_pane_flashes_once(closed):
+def test_a_pane_reflects_once(closed):
     """Face on, a pane echoes lambda |r| / (8 pi R) with r of the slab, be it a sheet or a body with two faces."""
     pane = sheet("pane", "glass", (1.5, 0, 0), (4.0, 4.0), (-1, 0, 0))
     if closed:
@@ -238,7 +238,7 @@ def office():
 
 @pytest.mark.parametrize(("place", "yaw"), [((6.0, 6.0, 1.2), 0.1), ((3.0, 3.0, 1.3), 2.0), ((13.0, 9.0, 1.1), -1.0)])
 def test_reciprocity_of_an_office(office, place, yaw):
-    """With the places of TX and RX swapped the field is the same to -60 dB, whatever the cause of the echoes."""
+    """With the places of TX and RX swapped the field is the same to -60 dB, whatever the type of the echoes."""
     place = np.array(place)
     echoes = office(place, Rotation.from_euler("z", yaw).as_matrix())
     assert all(len(echoes.where(bounces=n, kind=Kind.POINT)) for n in (1, 2))
@@ -285,7 +285,7 @@ def test_a_mirror_of_any_size(half, off):
 
 
 def test_an_antenna_of_high_gain_has_its_ghosts():
-    """The search knows the antenna's peak: what 30 dBi lift above the threshold is found."""
+    """The search uses the antenna's peak gain: it finds paths that 30 dBi lift above the threshold."""
     place, lift = np.array([2.6, 0.3, 0.1]), 19.5
     weak = finder([GLASS], place)(HERE, AHEAD)
     ghosts = weak.where(bounces=2, through=False, moving=False).amplitude
@@ -332,8 +332,9 @@ def test_a_corner_behind_a_pane(moving, angle):
 
 
 def test_all_phantoms_behind_a_pane():
-    """A target in a corner of two walls, all behind 6 mm of glass: every pair of ways, by one mirror, by two, straight,
-    as without the pane, times what that leaves of either."""
+    """A target in a corner of two walls, all behind 6 mm of glass: every pair of paths, over one mirror, over two,
+    direct,
+    as without the pane, times its transmission of both paths."""
     walls = [sheet("left", "metal", (2.7, 1.2, 0), (3.0, 2.4), (0, -1, 0)), AT_END]
     pane = sheet("pane", "glass", (0.8, 0, 0), (6.0, 4.0), (-1, 0, 0))
     place = np.array([2.4, 0.5, 0.0])

@@ -60,7 +60,7 @@ PLACES = [(-0.7, 0, 0), (0, 0.8, 0.4), (0.3, 0.2, 1.0), (2.0, -1, 3)]
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("axes", [(0.2, 0.2, 0.208), (0.15, 0.2, 0.3)])
 def test_ellipsoids(axes, place):
-    """A sphere stretched by 4 % and an ellipsoid: 0.4 dB and 3 deg (two thirds of it the mesh's), formerly -25 dB."""
+    """A sphere stretched by 4 % and an ellipsoid: 0.4 dB and 3 deg (two thirds of it the mesh's)."""
     found, truth = field(body(stretched, axes), place), physical_optics(samples(ellipsoid, axes), place)
     off, turn = decibels_and_degrees(found, truth)
     assert off == pytest.approx(0, abs=0.4)
@@ -98,7 +98,7 @@ def test_noisy_meshes(subdivisions, noise):
     ],
 )  # fmt: skip
 def test_half_cylinders(place):
-    """Before, at and past their borders: 0.8 dB and 4 deg; formerly -24 to -29 dB."""
+    """Before, at and past their borders: 0.8 dB and 4 deg."""
     found = field(body(half_cylinder, 0.15, 1.0, 12), place)
     off, turn = decibels_and_degrees(
         found, physical_optics(samples(tube, 0.15, 0.5, np.pi / 2, 3 * np.pi / 2), place, soft=0.02)
@@ -134,8 +134,8 @@ def test_dielectrics_reflect_as_walls_of_theirs_do(material):
      (0.05, (-1, 0, 0)), (0.05, (-4, 0, 0)), (0.05, (0, 0.1, 2)), (0.2, (0, 0.01, 2))],
 )  # fmt: skip
 def test_capsules(half, place):
-    """Broadside, at the joint and on end: 0.8 dB and 5 deg; formerly -6 dB. Ends of the pipe and of its roundings
-    cancel as far as they should."""
+    """Broadside, at the joint and on end: 0.8 dB and 5 deg. Ends of the pipe and of its roundings cancel as far as they
+    should."""
     found = field(body(capsule, 0.05, half), place)
     off, turn = decibels_and_degrees(found, physical_optics(samples(rounded, 0.05, half), place))
     assert off == pytest.approx(0, abs=0.8)
@@ -238,7 +238,7 @@ def test_ghosts():
 
 
 def test_a_board_hides_it():
-    """Through the finder: one flash from the ellipsoid, none behind a metal board."""
+    """Through the finder: one specular reflection of the ellipsoid, none behind a metal board."""
     egg = SceneObject("egg", shapes.placed(stretched((0.15, 0.2, 0.3)), (2, 0, 0)), MATERIALS["metal"])
     board = SceneObject("board", shapes.box((1, 0, 0), (0.02, 0.8, 0.8)), MATERIALS["metal"])
     at_egg = []

@@ -1,4 +1,4 @@
-"""What is a ghost, and what each path met on its way: by places that the radar can and cannot resolve."""
+"""Path types: distinction between real targets and ghosts by the radar's resolution."""
 
 from types import SimpleNamespace
 
@@ -24,7 +24,7 @@ NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
 
 def found(objects, points=NOTHING, config=CONFIG):
-    """Paths at the origin, and their types."""
+    """Paths of a radar at the origin, and their types."""
     scene = Scene("place", [SceneObject(f"{k}", mesh, MATERIALS[name]) for k, (mesh, name) in enumerate(objects)])
     paths = PathFinder(scene, points, Reflectors.of(scene, CONFIG), config, 1e-9)(HERE, AHEAD)
     lengths = paths.lengths(config, STILL, 0.0)[..., 0]
@@ -62,7 +62,7 @@ def test_a_corner_that_is_not_quite_square_is_none(shear):
 
 @pytest.mark.parametrize(("gap", "ghost"), [(0.015, False), (0.5, True)])
 def test_an_image_behind_a_wall(gap, ghost):
-    """A thing before a wall is a ghost behind it, if the radar can tell their ranges apart."""
+    """The image of an object in a wall is a ghost, if the radar resolves their ranges."""
     paths, types = found([wall(3.0)], point(3.0 - gap, 0.3, 0.0))
     mirrored = paths.bounces == 2
     assert mirrored.any()
@@ -71,7 +71,7 @@ def test_an_image_behind_a_wall(gap, ghost):
 
 @pytest.mark.parametrize(("gap", "ghost"), [(0.1, False), (1.0, True)])
 def test_an_image_beside_a_wall(gap, ghost):
-    """At the same range, what tells them apart is the beam: 0.33 m wide either way at 3 m."""
+    """At equal range, the beam distinguishes them: 0.33 m wide to either side at 3 m."""
     paths, types = found([wall(3.0, side=1.2)], point(3.0, 1.2 - gap, 0.0))
     mirrored = paths.bounces == 2
     assert mirrored.any()
@@ -80,7 +80,8 @@ def test_an_image_beside_a_wall(gap, ghost):
 
 @pytest.mark.filterwarnings("error")
 def test_one_antenna_tells_no_directions_apart():
-    """The image beside a wall that a row of eight tells from the wall is at its range, and so no ghost."""
+    """The image beside a wall that a row of eight antennas separates from the wall is at its range: no ghost for
+    one."""
     alone = CONFIG.model_copy(update={"tx_order": (0,), "rx": (0,)})
     paths, types = found([wall(3.0, side=1.2)], point(3.0, 0.2, 0.0), alone)
     mirrored = paths.bounces == 2

@@ -21,7 +21,7 @@ CONFIG = PRESETS["radarize"]
 
 
 def scanned_wall(seed, noise, step=0.05, size=2.0):
-    """A wall at x = 2 m, facing -x, as a scanner gives it: triangles of `step`, corners off by `noise` RMS."""
+    """A wall at x = 2 m, facing -x, as a scanner gives it: triangles of `step`, corners with `noise` RMS error."""
     n = round(size / step) + 1
     y, z = np.meshgrid(np.linspace(-size / 2, size / 2, n), np.linspace(-size / 2, size / 2, n), indexing="ij")
     vertices = np.stack([np.full(y.size, 2.0), y.ravel(), z.ravel()], axis=1)
@@ -32,7 +32,7 @@ def scanned_wall(seed, noise, step=0.05, size=2.0):
 
 
 def finder(mesh):
-    """Of the paths to a wall of concrete."""
+    """Finder of the paths to a concrete wall."""
     scene = Scene("scan", [SceneObject("wall", mesh, MATERIALS["concrete"])])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     return PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)
@@ -135,7 +135,7 @@ def test_leaning_faces_are_covered_to_the_bit_as_their_outlines_are_cut(monkeypa
             ]
 
 
-def test_an_ell_shaped_wall_flashes_where_it_is():
+def test_an_ell_shaped_wall_reflects_where_it_is():
     """The coherent echo of an L-shaped mesh is that of a large wall in front of it and none in front of the notch."""
     ell = shapely.Polygon([(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)])
     mesh = shapes.polygon(ell, (2, 0, 0), (0, -1, 0), (0, 0, 1))

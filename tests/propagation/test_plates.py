@@ -32,7 +32,7 @@ def field(facets, position):
 
 @pytest.mark.parametrize("distance", [0.5, 2.0, 4.0])
 @pytest.mark.parametrize("gamma", [-1.0, -0.25])
-def test_wall_flash(distance, gamma):
+def test_wall_reflection(distance, gamma):
     """|a| = lambda |Gamma| / (4 pi 2 R) from a wall that fills the view."""
     amplitude = abs(field(plate((40, 40), gamma), (-distance, 0, 0)))
     assert 20 * np.log10(amplitude / (LAMBDA * abs(gamma) / (8 * np.pi * distance))) == pytest.approx(0, abs=0.05)
@@ -124,7 +124,7 @@ def test_plate_over_twenty_degrees():
     assert np.abs(20 * np.log10(found / expected)[lobes]).max() < 1
 
 
-def test_no_step_as_the_flash_leaves_the_plate():
+def test_no_step_as_the_reflection_leaves_the_plate():
     """Sliding past the edge in tenths of a millimetre, the field never jumps."""
     y = 0.3 + np.arange(-100, 100) * 1e-4
     values = np.array([field(plate((0.3, 0.3)), (-1, at, 0)) for at in y])

@@ -1,4 +1,4 @@
-"""The finder's choice of mirrors loses nothing: its ghosts against those over all reflectors, in all orders."""
+"""Recall of the search for mirrors: its ghosts against those over all reflectors, in all orders."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ CONFIG = PRESETS["radarize"]
 
 
 def every_mirror(observation, flat, obstacles):
-    """All reflectors that turn a face to the radar, and after them all before which they stand, as corners tell."""
+    """All reflectors that turn a face to the radar, and for each all reflectors with a corner in front of it."""
     found = []
     for p in observation.position:
         over = np.einsum("md,md->m", p - flat.center, flat.normal)
@@ -43,7 +43,7 @@ def every_mirror(observation, flat, obstacles):
 
 
 def power(frames):
-    """Of all paths over mirrors that move nothing and pass no slab."""
+    """Power of all static paths over mirrors without slabs."""
     every = Paths.joined([p.where(moving=False, through=False) for p in frames.paths])
     return np.sum(np.abs(every.amplitude[every.bounces > 0]) ** 2)
 

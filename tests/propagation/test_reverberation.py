@@ -1,4 +1,4 @@
-"""Diffuse multipath: its power in an integrating sphere, and that its walks are of the world."""
+"""Diffuse multipath: its power in an integrating sphere, and that its walks are fixed in the world."""
 
 from dataclasses import replace
 
@@ -52,7 +52,7 @@ def uniform(monkeypatch):
 
 @pytest.mark.parametrize("level", [0.4, 1.0, 3.0])
 def test_an_integrating_sphere(uniform, level):
-    """With albedo rho, all of a sphere of radius R is lit alike, after the n-th scattering with rho^n of the power. At
+    """With albedo rho, all of a sphere of radius R is lit uniformly: n scatterings leave rho^n of the power. At
     the middle an isotropic antenna gets lambda^2 rho^n / (4 pi^2 R^2) of it, half of that in its polarisation, twice
     for both ways round, and a quarter of it both from and to where it looks. The mean chord is 4 R / 3."""
     radius, seeds = 6.0, 3

@@ -85,13 +85,14 @@ def test_ghosts_of_round_bodies(kind):
         assert np.rad2deg(np.angle(turned)) == pytest.approx(0, abs=6)
 
 
-def leg_ghosts(bottom, tilt):
-    """Ghosts over a metal floor of a leg 2 m off, up to 0.7 m and tilted (deg), and the integral over what is above it,
-    both as the sum of the two orders of floor and leg."""
+def pole_ghosts(bottom, tilt):
+    """Ghosts of a pole 2 m off over a metal floor, up to 0.7 m and tilted (deg), and the integral over the part above
+    the
+    floor, both as the sum of the two orders of floor and pole."""
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
-    leg = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
-    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
+    pole = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
+    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, pole))
     points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
     points, normals = turned.apply(points) + center, turned.apply(normals)
     lit = points[:, 2] > 0
@@ -102,12 +103,12 @@ def leg_ghosts(bottom, tilt):
 
 @pytest.mark.parametrize("bottom", [0.0, -0.4, 0.03])
 @pytest.mark.parametrize("tilt", [0.0, 1e-6, -1e-6, 0.05, -0.05, 0.5, -0.5])
-def test_a_leg_on_a_level_floor(bottom, tilt):
-    """A table leg that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
+def test_a_pole_on_a_level_floor(bottom, tilt):
+    """A table pole that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
 
     With the floor it is a corner of 90 deg, whose ghosts come from its foot; tilted, from above or from below that.
     """
-    value, truth = leg_ghosts(bottom, tilt)
+    value, truth = pole_ghosts(bottom, tilt)
     assert 20 * np.log10(abs(value) / abs(truth)) == pytest.approx(0, abs=0.5)
     # Two conductors: upright fields keep their sign.
     assert np.rad2deg(np.angle(-value / truth)) == pytest.approx(0, abs=6)

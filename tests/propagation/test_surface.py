@@ -57,7 +57,7 @@ def table(scatterers):
 
 
 def test_the_same_scatterers_from_everywhere():
-    """What is seen from here and from there is the same, and all of it is in the whole world's list."""
+    """Scatterers visible from two positions are the same, and all of them are in the list of the whole world."""
     world = surface()
     here, there, everywhere = (table(s) for s in (
         world.near(np.array([[1.0, 0, 0]]), 3.0), world.near(np.array([[2.0, 0.5, 0.2]]), 3.0), world.all(),
@@ -233,7 +233,7 @@ def test_cost_does_not_depend_on_the_building():
 
 
 def test_a_room_in_one_mesh_has_the_floor_of_one_in_parts():
-    """As in a scan: scatterers, flat parts and small things on floor and ceiling are told from those on walls."""
+    """As in a scan: scatterers, flat parts and objects on floor and ceiling are distinguished from those on walls."""
     parts = [item.mesh for item in SCENE.objects]
     whole = Scene(
         "scan",

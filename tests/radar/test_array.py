@@ -79,7 +79,7 @@ def test_the_low_power_square_is_full():
 
 
 def test_channels_of_the_low_power_board_are_reversed_by_turns():
-    """As TI's files say: compRangeBiasAndRxChanPhase 0.0 1 0 -1 0 1 0 -1 0 1 0 -1 0."""
+    """As in TI's files: compRangeBiasAndRxChanPhase 0.0 1 0 -1 0 1 0 -1 0 1 0 -1 0."""
     assert BOARDS["iwrl6432boost"].nominal_calibration == ((1, 0), (-1, 0)) * 3
 
 

@@ -166,7 +166,7 @@ def test_several_subframes_or_bursts_are_refused(given, words):
 
 # --- which board -----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
-    ("line", "board", "said"),
+    ("line", "board", "remarked"),
     [
         ("", "iwr1843boost", True),
         ("% Platform:xWR18xx", "iwr1843boost", False),
@@ -175,11 +175,11 @@ def test_several_subframes_or_bursts_are_refused(given, words):
         ("% Platform:xWR14xx", "iwr1443boost", False),
     ],
 )
-def test_an_assumed_board_is_said(line, board, said):
+def test_an_assumed_board_is_remarked(line, board, remarked):
     given = f"{line}\n{text(1, 4)}"
     config = parse_cfg(given)
     assert config.board == board
-    assert remarks(given, config) == ([assumed_board(config)] if said else [])
+    assert remarks(given, config) == ([assumed_board(config)] if remarked else [])
 
 
 def test_sixty_gigahertz_without_a_board():

@@ -121,7 +121,7 @@ NEW = ("awr1642boost", "iwr1443boost", "awr1843aop", "awr2243boost", "awr2944evm
 
 @pytest.mark.parametrize("board", NEW)
 def test_points_of_two_seconds_lie_where_the_target_is(tmp_path, board):
-    """From a .cfg through a recording to the chip's point cloud: azimuth, and elevation where the array tells it."""
+    """From a .cfg through a recording to the chip's point cloud: azimuth, and elevation where the array resolves it."""
     config = radar(board).changed("radar", frame_period=0.25, loops=16)
     (tmp_path / "radar.cfg").write_text(write_cfg(config))
     elevation = 8 if tells_elevation(config) else 0

@@ -1,4 +1,4 @@
-"""Calibration finds what a simulated radar was made of, and says something sensible about real ones."""
+"""Calibration recovers the settings of a simulated radar, and gives plausible ones for real radars."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def record(path, settings, board, config=CONFIG, velocity=(0, 0, 0), targets=((2
 
 
 def without_slope(channel):
-    """A channel's errors as far as they can be told: no slope of the phase over the array, mean gain 1."""
+    """A channel's errors as far as they are observable: no slope of the phase over the array, mean gain 1."""
     phase = np.angle(channel).ravel()
     across = np.array([[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 6, 7]]).ravel()
     up = np.array([0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0])
@@ -99,7 +99,7 @@ def test_a_quiet_board_has_no_leakage(tmp_path):
     )
     found = calibrate(tmp_path / "real.h5", tmp_path / "board.yaml")
     assert found.settings.leakage is None and found.settings.mount is None
-    assert found.settings.mismatch == Mismatch()  # nothing to tell it from
+    assert found.settings.mismatch == Mismatch()  # unobservable here
     assert found.settings.full_scale_dbm == pytest.approx(8.0, abs=0.3)
 
 

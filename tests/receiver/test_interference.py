@@ -1,4 +1,4 @@
-"""What other radars send, against both waveforms multiplied in small steps and against closed forms."""
+"""Interference, against both waveforms multiplied in small steps and against closed forms."""
 
 import json
 
@@ -20,7 +20,7 @@ from radarsim.world.scene import Scene
 
 
 def signal(*others: dict, time: float = 0.0, **changes) -> np.ndarray:
-    """What they add to a frame: (loop, tx, rx, sample)."""
+    """Interference in a frame: (loop, tx, rx, sample)."""
     made = scenario(*others, **changes)
     return made.interference(made.motion, time)
 
@@ -74,7 +74,7 @@ def test_energy_of_a_crossing(difference):
 
 
 def test_duration_of_a_crossing():
-    """IF bandwidth over slope difference: a stripe of so many samples."""
+    """IF bandwidth over slope difference gives the number of disturbed samples."""
     difference = 0.25e12
     found = np.abs(signal(facing(3, radar={"slope": CONFIG.slope - difference, "loops": 8}, start=-75e-9))[0, 0, 0])
     half = CONFIG.sample_rate * (0.03 + 0.975)  # between the points of half the amplitude
@@ -90,7 +90,7 @@ def ghost_range(found: np.ndarray) -> float:
 
 
 def test_like_chirps_make_a_ghost():
-    """At half the way that the other's chirps are late by; it drifts by as much as the clocks do."""
+    """A chirp of equal slope gives a ghost at half the delay between the chirps; it drifts with the clock error."""
     for start, distance in ((5e-9, 1.0), (-2e-9, 3.0)):
         found = signal(facing(distance, start=start))
         expected = (SPEED_OF_LIGHT * start + distance) / 2
@@ -116,7 +116,7 @@ def test_direction_is_the_others_bearing(bearing, fields, crossing):
 
 
 def test_it_comes_in_by_the_receivers():
-    """Its level and phase do not hang on which of our transmitters is on; receivers' errors stay in it."""
+    """Its level and phase do not depend on the active transmitter; receivers' errors are included."""
     board = FrontEndConfig.ideal(band=Band(), mismatch={"gain_db": 6, "phase_deg": 90})
     made = scenario(facing(3, **GHOST), front_end=board)
     counts = made.board.receive(made.interference(made.motion, 0.0), np.random.default_rng(0))
@@ -181,17 +181,17 @@ def test_who_sends_elsewhere_changes_nothing():
 
 
 def test_the_pipeline_leaves_such_chirps_out(tmp_path):
-    """A recording says who sent, and the chirps that the pipeline leaves out are those that were crossed."""
+    """A recording lists the interferers, and the chirps that the pipeline leaves out are those that were disturbed."""
     scene = Scene.of(ROOM | {"interferers": [ROBOT]}, "room")
     config = PRESETS["radarize"]
     places = np.array([[0.0, 0.0], [0.8, 0.1]])
     path = simulate(scene, tmp_path / "x.h5", duration=0.4, waypoints=places, seed=2, sensors=["adc-by-cause"])
     with Recording(path) as recording:
         samples, valid = recording.adc(0, len(recording)), recording.valid(0, len(recording))
-        (said,) = json.loads(recording.attributes["interferers"])
+        (stated,) = json.loads(recording.attributes["interferers"])
         parts = recording.read("truth/adc_by_cause")
         about = recording.describe("truth/adc_by_cause")["about"]
-    assert (said["name"], said["velocity"], said["radar"]["slope"]) == ("robot", [-0.5, 0.0, 0.0], 60e12)
+    assert (stated["name"], stated["velocity"], stated["radar"]["slope"]) == ("robot", [-0.5, 0.0, 0.0], 60e12)
     assert about.endswith("interference, leakage")
     found = find_flaws(samples, valid).disturbed
     window = np.hanning(config.samples)[:, None]  # what falls into its ends harms nobody, and is not looked for

@@ -20,7 +20,7 @@ def error_db(found, truth):
 
 
 def cloud(rng, n):
-    """Point echoes all around in front, a quarter of them ghosts whose two legs differ."""
+    """Point echoes all around in front, a quarter of them ghosts with different paths out and back."""
     place = rng.uniform([0.3, -2.5, -1.2], [4.2, 2.5, 1.2], (n, 3))
     points = np.repeat(place[:, None], 2, axis=1)
     points[: n // 4, 1] += rng.uniform(-1, 1, (n // 4, 3))

@@ -1,4 +1,4 @@
-"""A recording is a function of its scenario: however it is made, all that it holds is the same to the byte.
+"""A recording is a function of its scenario: its bytes do not depend on how it is made.
 
 Batches, processes, kills, a cluster and sensors that are added later do not matter; neither does the order of frames.
 """
@@ -127,7 +127,7 @@ class Killed(Exception):
 
 
 def until_killed(plan: dict, path: Path, frames: int) -> None:
-    """What a run leaves that is killed after so many frames."""
+    """Partial recording of a run that is killed after a number of frames."""
     part, left = path.with_name(path.name + ".part"), path.with_name("left")
 
     def progress(done: int, _: int) -> None:
@@ -174,7 +174,7 @@ def test_sensors_do_not_change_each_other_but_the_seed_does(plan, expected, tmp_
 
 @pytest.mark.parametrize("other", ["seed", "world"])
 def test_what_another_run_has_left_is_not_gone_on_with(other, plan, expected, tmp_path, monkeypatch):
-    """Of another seed, and of another world of the same name, which only its frames tell."""
+    """A partial recording of another seed, or of another world of the same name, detected by its frames."""
     monkeypatch.setattr(batches, "TOGETHER", 2)
     plan = plan | {"sensors": ()}
     (tmp_path / "hall.yaml").write_text("".join(line for line in hall.HALL.splitlines(True) if "pipe" not in line))
@@ -213,9 +213,9 @@ def test_a_data_set_that_was_killed(specification, maps, tmp_path, capsys):
     stamp = first.stat().st_mtime_ns
     with pytest.raises(SystemExit) as ended:
         run(app, "radarsim", typed)
-    said = capsys.readouterr()
-    assert ended.value.code == 0, said.err
-    assert "1 recordings made, 1 already there" in said.out and f"{second.stem}: " in said.out
+    printed = capsys.readouterr()
+    assert ended.value.code == 0, printed.err
+    assert "1 recordings made, 1 already there" in printed.out and f"{second.stem}: " in printed.out
     assert first.stat().st_mtime_ns == stamp
     same(tmp_path, maps)
 
@@ -223,7 +223,7 @@ def test_a_data_set_that_was_killed(specification, maps, tmp_path, capsys):
 def test_a_data_set_by_a_ray_cluster(cluster, specification, maps, tmp_path):
     seen = []
     outcome = make(
-        Specification.load(specification), tmp_path, ray=cluster, progress=lambda *p: seen.append(p), say=lambda _: None
+        Specification.load(specification), tmp_path, ray=cluster, progress=lambda *p: seen.append(p), log=lambda _: None
     )
     assert len(outcome.made) == 2 and seen[-1] == (2 * COUNT, 2 * COUNT)
     same(tmp_path, maps)

@@ -1,4 +1,4 @@
-"""The I/Q by cause where a part exceeds the converter."""
+"""I/Q by path type where a part exceeds the converter's range."""
 
 import numpy as np
 

@@ -103,9 +103,9 @@ def test_noise_grows_with_the_square_of_the_distance(distance):
     assert measured[seen].std() == pytest.approx(np.hypot(expected, 1e-3 / np.sqrt(12)), rel=0.08)
     assert measured[seen].mean() == pytest.approx(distance, rel=0.01)
     # The strip at the left that only the left imager sees is a baseline wide.
-    blind = stereo.baseline / distance * QUARTER.fx
+    hidden = stereo.baseline / distance * QUARTER.fx
     empty = np.flatnonzero(seen.mean(axis=(0, 1)) == 0)
-    assert len(empty) == pytest.approx(blind, abs=1) and (not len(empty) or empty.max() == len(empty) - 1)
+    assert len(empty) == pytest.approx(hidden, abs=1) and (not len(empty) or empty.max() == len(empty) - 1)
     assert seen[..., len(empty) :].mean() == pytest.approx(1 - stereo.dropout, abs=2e-3)
 
 

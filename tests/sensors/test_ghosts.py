@@ -1,4 +1,4 @@
-"""Maps by cause against the heat maps of the I/Q by cause."""
+"""Maps by path type against the heat maps of the I/Q by path type."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ CONFIG = PRESETS["radarize"]
 
 @pytest.fixture(scope="module")
 def seen():
-    """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
+    """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by path type)."""
     scene = Scene.load("visitors")
     motion = Walk("handheld", 5.0).through(scene, 5)
     scenario = Scenario(scene, motion, CONFIG, FrontEndConfig.of(CONFIG.board, mismatch=None), seed=1)

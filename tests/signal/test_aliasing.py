@@ -1,4 +1,4 @@
-"""Windows of speeds told by transmitters' turns: of single points, whose speeds are known."""
+"""Resolution of Doppler ambiguity from phase steps between transmitters, for single points of known speed."""
 
 import numpy as np
 import pytest

@@ -96,7 +96,7 @@ def test_batches_keep_their_samples(signal, adc):
 
 
 def test_maps_alone(signal):
-    """A batch of maps gives them as they are, and says so where somebody asks for more."""
+    """A batch of maps returns them unchanged, and raises an error for other products."""
     shown = np.arange(24.0).reshape(2, 3, 4)
     preprocessor = Preprocessor(signal)
     first, second = (

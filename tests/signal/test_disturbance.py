@@ -23,7 +23,7 @@ def tour():
     rng = np.random.default_rng(0)
     points, amplitudes = furnished_room(rng, density=8.0, boxes=6)
     pose = walk(rng, 2.0)
-    points, amplitudes = np.vstack([points, [6.9, 2.5, 0.0]]), np.append(amplitudes, 3000.0)  # flashes
+    points, amplitudes = np.vstack([points, [6.9, 2.5, 0.0]]), np.append(amplitudes, 3000.0)  # a strong echo
     adc = record(CONFIG, pose, points, amplitudes, STAMPS, rng, 20.0, block=32, gain=antenna_gain)
     leakage = 3000 * np.exp(2j * np.pi * 0.3 * np.arange(CONFIG.samples) / CONFIG.samples)
     adc += np.stack([leakage.real, leakage.imag], axis=-1).astype(np.int16)
@@ -90,7 +90,7 @@ def test_lost_chirps_have_no_say(tour):
     valid[3], valid[4, :, 1], valid[5, 5:] = False, False, False
     hurt[~valid] = 30000
     expected = hit & valid
-    expected[5] = False  # too few are left to tell
+    expected[5] = False  # too few are left for an estimate
     assert np.array_equal(find_flaws(hurt, valid).disturbed, expected)
 
 

@@ -1,4 +1,4 @@
-"""Radars whose frames are much larger than the preset's: what they cost is bounded, and said before."""
+"""Radars whose frames are much larger than the preset's: memory is bounded, and a remark states the cost."""
 
 import numpy as np
 import pytest

@@ -118,7 +118,7 @@ def test_beam_width():
 
 def test_capon_resolves_what_the_beam_does_not():
     maps = Heatmaps(CONFIG)
-    # Moving tells the two apart in Doppler, so that they are not coherent.
+    # Motion separates the two in Doppler, so that they are not coherent.
     adc = frame([point(2.0, -5), point(2.0, 6)], velocity=(0, 1.2, 0), noise=3.0)
 
     def dip(power):
@@ -217,7 +217,7 @@ def test_batches_equal_single_frames_and_wrong_shapes_are_named():
     maps = Heatmaps(CONFIG)
     adc = np.concatenate([frame(point(2.0, a)) for a in (-20, 0, 20)])
     together = maps.range_azimuth(adc)
-    # How sums are ordered differs with the size of a batch on some processors: alike to single precision of the peak.
+    # How sums are ordered differs with the size of a batch on some processors: equal to single precision of the peak.
     peak = float(together.max())
     torch.testing.assert_close(together[1:2], maps.range_azimuth(adc[1:2]), rtol=1e-5, atol=1e-6 * peak)
     with pytest.raises(InputError, match="expected"):

@@ -1,4 +1,4 @@
-"""Broken receivers: what fills their place is what they would have said of single echoes."""
+"""Broken receivers: their interpolated values equal the true ones for single echoes."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_a_single_echo_is_as_if_nothing_were_broken(places, azimuth):
     broken[1, list(places)] = True
     hurt.unflatten(-1, (3, 4))[1][..., list(places)] = 777.0
     found = Receivers(CONFIG).filled(hurt, broken)
-    missing = (0, 3) if places == (1, 2) else ()  # no two neighbours are left to tell the step
+    missing = (0, 3) if places == (1, 2) else ()  # no two neighbours are left to estimate the step
     expected = whole.clone()
     if missing:
         expected.unflatten(-1, (3, 4))[1][..., list(places)] = 0

@@ -1,4 +1,4 @@
-"""Fréchet's distance against closed forms; patch statistics of maps made by hand."""
+"""Fréchet distance against closed forms; patch statistics of maps with known content."""
 
 import numpy as np
 import pytest

@@ -191,7 +191,7 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
 
 
 def test_poses_of_another_body_in_another_frame(real, tmp_path, compared):
-    """Poses of a cart, in coordinates of its own, make the same twin once both are told."""
+    """Poses of a cart, in its own coordinates, give the same twin if origin and mounting are given."""
     origin, mounting = Mounting.of((3, -2, 0.4), (0, 0, 50)), Mounting.of((0.2, 0.1, 0.5), (0, 10, -30))
 
     def change(poses, file):

@@ -1,4 +1,4 @@
-"""Ray tests against other programs' and against geometry done by hand."""
+"""Ray tests against other programs' and against geometry calculated manually."""
 
 import numpy as np
 import pytest
@@ -132,7 +132,7 @@ def lying(*objects: SceneObject) -> np.ndarray:
 
 
 def test_floor_and_ceiling_of_a_room_in_one_mesh():
-    """A scan knows faces alone: those at the bottom that face up, and those at the top that face down."""
+    """In a scan, faces at the bottom that face up are floor, and those at the top that face down are ceiling."""
     room, table = shapes.box((0, 0, 1.3), (5, 4, 2.6)), shapes.box((0, 0, 0.7), (1, 1, 0.04))
     room.invert()
     cabinet = shapes.box((2, 0, 1.05), (0.5, 0.5, 2.1))

@@ -87,7 +87,7 @@ def test_they_stand_in_nothing_and_not_in_one_another(drawn, found, name):
         half = spots.size[k] / 2
         inside = (near - spots.place[k]) @ spots.axes[k].T / half - [0, 0, 1]
         flat, faces = inside.reshape(-1, 3), np.arange(inside.size // 3).reshape(-1, 3)
-        edge = 1 - 2.5e-3 / half  # a surface may be off by 2 mm
+        edge = 1 - 2.5e-3 / half  # tolerance of a surface: 2 mm
         for axis, sign in product(range(3), (-1, 1)):
             if len(faces):
                 normal = -sign * np.eye(3)[axis]

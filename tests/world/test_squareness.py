@@ -64,7 +64,7 @@ def test_planes_stay_planes():
 @pytest.mark.parametrize("off", [-1.0, -0.3, 0.0, 0.3, 1.0])
 @pytest.mark.parametrize("distance", [1.0, 3.0])
 def test_a_corner_out_of_square(off, distance):
-    """Each order of its walls makes an image, at the place and as strong as half a plane's diffraction says."""
+    """Each order of its walls makes an image, with the position and strength of half a plane's diffraction."""
     angle = np.deg2rad(off)
     walls, position = corners.out_of_square(angle), np.array([distance, 0.0, 0.0])
     assert np.all(np.einsum("md,md->m", walls.normal, position - walls.center) > 0)

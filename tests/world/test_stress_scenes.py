@@ -42,7 +42,7 @@ def before_the_surface(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
 
 #: What rises with the level, and by how much at least from `FIRST` to level 3. The ladder starts from rooms with some
 #: clutter: diffuse multipath makes ghosts, too, and at level 1 it drowns those of the place.
-CLAIMS = {
+EXPECTED = {
     "corner": (caused_by(PathType.GHOST), 0.15),
     "cul-de-sac": (caused_by(PathType.GHOST), 0.08),
     "glass-corridor": (caused_by(PathType.GHOST, PathType.THROUGH_SLAB), 0.1),
@@ -58,10 +58,10 @@ CLAIMS = {
 FIRST = {"shelves": 1, "overhead": 1}
 
 
-@pytest.mark.parametrize("place", CLAIMS)
+@pytest.mark.parametrize("place", EXPECTED)
 def test_every_level_is_worse_than_the_one_before(place):
     tasks = [task for task in TASKS if task.building == place]
-    measure, least = CLAIMS[place]
+    measure, least = EXPECTED[place]
     found, motion = [], None
     for task in tasks:
         scene = Scene.load(task.scene)

@@ -1,4 +1,4 @@
-"""Rooms are told from solids, and up from sideways, whatever a file's faces and axes are."""
+"""Rooms are distinguished from solids, and the up axis is found, whatever a file's faces and axes are."""
 
 import numpy as np
 import pytest
@@ -117,8 +117,8 @@ def test_a_scene_without_echoes_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit) as exit_:
         run(app, "radarsim", line)
     assert exit_.value.code == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert "block: no frame has an echo, expected surfaces" in said and not (tmp_path / "a.h5").exists()
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "block: no frame has an echo, expected surfaces" in printed and not (tmp_path / "a.h5").exists()
 
 
 def walls_of_a_room():

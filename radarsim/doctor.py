@@ -1,9 +1,8 @@
 """Check of the machine: what simulation needs, what is missing, and the command that installs it.
 
-``python -m radarsim.doctor --missing-packages`` prints the missing system packages. `setup.sh` calls it
-before any Python package is installed, so everything beyond the standard library is imported late.
-``python -m radarsim.doctor --first-frame`` simulates a frame, which compiles the simulator: the last step of
-set-up.
+``python -m radarsim.doctor --missing-packages`` prints the missing system packages. `setup.sh` calls it before any
+Python package is installed, so everything beyond the standard library is imported late. ``python -m radarsim.doctor
+--first-frame`` simulates a frame, which compiles the simulator: the last step of set-up.
 """
 
 import ctypes

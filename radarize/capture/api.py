@@ -238,11 +238,10 @@ def live(
         duration: end after this time, s.
         frames: end after this number of frames.
         options: ``weights``: folder of the networks' weights, default: those of the package; ``pipeline``: its
-            settings,
-            or a YAML file of them, as ``config`` of `run`; ``baud`` of the port; ``host`` (this computer), ``dca``,
-            ``command_port`` and ``data_port`` of the DCA1000; ``output``: record as well (``.h5``), ``overwrite`` an
-            existing one; ``address`` (``HOST:PORT``) of a local page with the live view, ``foxglove`` of a server for
-            Foxglove; ``board``: file of the board with its calibration, see `calibrate`.
+            settings, or a YAML file of them, as ``config`` of `run`; ``baud`` of the port; ``host`` (this computer),
+            ``dca``, ``command_port`` and ``data_port`` of the DCA1000; ``output``: record as well (``.h5``),
+            ``overwrite`` an existing one; ``address`` (``HOST:PORT``) of a local page with the live view, ``foxglove``
+            of a server for Foxglove; ``board``: file of the board with its calibration, see `calibrate`.
 
     Returns:
         A session to iterate over: a `LiveFrame` for each frame that odometry uses, with pose, velocity and scan.

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from radarize.evaluation.foxglove import Server
 
 #: Largest number of frames per batch. Libraries cache buffers for every batch size, the more the larger it is: up to
-#: this
-#: size `prepare` creates all of them, and memory then grows with the map alone.
+#: this size `prepare` creates all of them, and memory then grows with the map alone.
 TOGETHER = 4
 #: s between pictures of a frame, and of the map; largest fraction of the time spent on drawing the map, and pause after
 #: every node, s, which itself takes half a millisecond.
@@ -172,8 +171,7 @@ class Live:
 
 def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
     """Warm up a pipeline so that it is fast from its first frame on: a copy processes noise, and SLAM, which noise does
-    not
-    move, a synthetic room, so that everything is compiled and loaded."""
+    not move, a synthetic room, so that everything is compiled and loaded."""
     torch.set_num_threads(1)  # a frame is too small to parallelise: synchronisation costs more
     pipeline = make_pipeline(inputs, methods["odometry"], methods["scans"])
     preprocessor, radar = Preprocessor(inputs.signal), inputs.radar

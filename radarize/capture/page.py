@@ -156,8 +156,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _ours(self) -> bool:
         """Whether the request is for this page: by address, or by a local name (against DNS rebinding), and not from
-        another
-        site."""
+        another site."""
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
         try:
             name = urlsplit(f"//{host}").hostname or ""

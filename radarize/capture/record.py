@@ -64,8 +64,7 @@ class Keeper:
 @contextmanager
 def recording(stream: FrameStream, output: Path, overwrite: bool = False) -> Iterator[Keeper]:
     """Open a recording of a stream's frames. However it ends, the recording is completed under its own name; if the
-    disk
-    does not permit that, the error names the partial file and how to recover it.
+    disk does not permit that, the error names the partial file and how to recover it.
 
     Args:
         stream: open stream.

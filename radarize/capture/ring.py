@@ -21,8 +21,7 @@ class FrameRing:
 
     Attributes:
         dtype: fields of a frame: ``number`` (from 0, lost and dropped frames counted), ``time`` (s), ``valid`` (loop,
-            tx) and
-            ``adc`` (loop, tx, rx, sample, iq).
+            tx) and ``adc`` (loop, tx, rx, sample, iq).
     """
 
     def __init__(self, config: RadarConfig, slots: int):

@@ -1,7 +1,7 @@
 """Radar's command line over UART: TI's `mmwDemo` firmware, 115200 baud, prompt ``mmwDemo:/>``.
 
-Every command is answered by ``Done``, or by ``Error ...`` and a message (mmWave SDK user guide,
-"Configuration (.cfg) file format").
+Every command is answered by ``Done``, or by ``Error ...`` and a message (mmWave SDK user guide, "Configuration (.cfg)
+file format").
 """
 
 import errno

@@ -30,8 +30,7 @@ def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
 
 def layout(config: RadarConfig) -> tuple[Float[np.ndarray, "tx 2"], Float[np.ndarray, "rx 2"]]:
     """Positions (left, up) of the enabled transmitters and receivers, physical order, in half wavelengths at the
-    board's
-    design frequency."""
+    board's design frequency."""
     board = load_board(config.board)
     tx, rx = np.asarray(board.tx, float), np.asarray(board.rx, float)
     return np.array([tx[list(fired(firing))].mean(axis=0) for firing in config.tx]), rx[list(config.rx)]
@@ -79,16 +78,14 @@ def azimuth_row(config: RadarConfig) -> Int[np.ndarray, "antenna"]:
 
 def row_beside(heights: Iterable[float], height: float) -> float | None:
     """Height of the row used with the one at `height` to estimate elevation: the nearest less than a wavelength away,
-    the
-    upper one of two; None without one. Heights in half wavelengths."""
+    the upper one of two; None without one. Heights in half wavelengths."""
     others = sorted((h for h in heights if 0 < abs(h - height) < 2), key=lambda h: (abs(h - height), -h))
     return others[0] if others else None
 
 
 def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
     """Pairs (lower, upper) of virtual antennas at the same y in neighbouring rows, less than a wavelength apart in z;
-    None
-    without such pairs.
+    None without such pairs.
 
     Averaging a pair steers to 0 deg elevation and, where it is half a wavelength high, nulls the zenith: the paper's
     elevation-aware beamforming (section 4).

@@ -118,8 +118,7 @@ class FrameAssembler:
     their chirps are marked.
 
     A single packet moves the stream by at most `window`. It moves further, or starts, only if several packets agree,
-    with
-    no packet between them that continues at the old position.
+    with no packet between them that continues at the old position.
 
     Args:
         window: distance in bytes behind the newest byte up to which a late packet is accepted.

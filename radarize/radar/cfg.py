@@ -130,8 +130,7 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
 
 def remarks(text: str, config: RadarConfig) -> list[str]:
     """Remarks on a configuration, a sentence each: the board that was assumed if none is named, and losses by the
-    firing
-    order of its transmitters (`radarize.radar.array.losses`).
+    firing order of its transmitters (`radarize.radar.array.losses`).
 
     Args:
         text: content of a ``.cfg`` file; for other formats there are no remarks on the board.

@@ -76,8 +76,8 @@ class RadarConfig(BaseModel):
         range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``); default: the
             board's.
         channel_calibration: measured complex factor per *physical* (tx, rx) of the board as (re, im) pairs: TX1 x RX1,
-            RX2, ..., then TX2, ... None: the board's: measured, or nominal, which removes its antennas'
-            signs. Ones, the default in TI's files, count as None.
+            RX2, ..., then TX2, ... None: the board's: measured, or nominal, which removes its antennas' signs. Ones,
+            the default in TI's files, count as None.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -226,8 +226,7 @@ class RadarConfig(BaseModel):
     @property
     def channels(self) -> tuple[np.ndarray, ...]:
         """Index of the enabled channels in an array of all the board's (tx, rx). Transmitters that fire simultaneously
-        use
-        the first one's: a factor common to all receivers changes no direction."""
+        use the first one's: a factor common to all receivers changes no direction."""
         return np.ix_([fired(firing)[0] for firing in self.tx], self.rx)
 
     @property

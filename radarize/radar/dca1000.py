@@ -107,10 +107,8 @@ def _demodulated(
 
     One chirp has the sum of both transmitters' echoes, the other one their difference, a little later. Before they are
     added, each is shifted to the other's time by a phase ramp over its Doppler spectrum, as in TI's demos: exact for
-    speeds
-    within `config.max_velocity`. If the phase of an echo differs between the start and the end of a burst, the first
-    and
-    last loops contain a residual of the other transmitter, 25 dB or more below it after windowing over loops.
+    speeds within `config.max_velocity`. If the phase of an echo differs between the start and the end of a burst, the
+    first and last loops contain a residual of the other transmitter, 25 dB or more below it after windowing over loops.
     """
     assert config.bpm is not None
     places = [config.turn[slot] for slot in config.bpm]

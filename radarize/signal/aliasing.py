@@ -1,10 +1,8 @@
 """Resolution of Doppler ambiguity: the span of speeds in a frame, from phase steps between transmitters.
 
 Transmitters fire one after the other, so an echo's phase changes by 4 pi v T / wavelength between the slots, T apart.
-If
-its speed v is taken one unambiguous span too low, a residual of 2 pi slot / slots remains, as a step between the parts
-of
-the azimuth row of two transmitters (after Roos, Bechter, Appenrodt, Dickmann and Waldschmidt, "Enhancement of
+If its speed v is taken one unambiguous span too low, a residual of 2 pi slot / slots remains, as a step between the
+parts of the azimuth row of two transmitters (after Roos, Bechter, Appenrodt, Dickmann and Waldschmidt, "Enhancement of
 Doppler unambiguity for chirp-sequence modulated TDM-MIMO radars", ICMIM 2018). One echo is seldom conclusive; hundreds
 in a frame are: all their closing speeds lie within one span, so that one window over speeds is correct for all Doppler
 bins. Every frame is decided independently, so that errors do not persist.

@@ -94,11 +94,9 @@ class Heatmaps:
     ) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
         """Range-Doppler spectrum of every virtual antenna, flat (tx, rx), with TDM delays compensated.
 
-        The compensation uses each bin's speed; echoes beyond `config.max_velocity` alias and keep a
-        phase step of 2 pi slot / slots between transmitters, see `unfolded`. Lost chirps have zero weight and the
-        remaining ones of the same transmitter a larger one, so that transmitters stay balanced; a transmitter without
-        any
-        chirp gives zero.
+        The compensation uses each bin's speed; echoes beyond `config.max_velocity` alias and keep a phase step of 2 pi
+        slot / slots between transmitters, see `unfolded`. Lost chirps have zero weight and the remaining ones of the
+        same transmitter a larger one, so that transmitters stay balanced; a transmitter without any chirp gives zero.
 
         Args:
             adc: raw samples, also as a torch tensor.

@@ -9,10 +9,8 @@
 
 Azimuth has 80 columns of 1.5 deg, the width of Capon's ridges, symmetric about the boresight, so that a flip is a
 mirror image. Range and Doppler keep their bins. Maps over Doppler use the limited spectrum (`Heatmaps.limited`),
-otherwise
-a single specular reflection would mask the ridge of the static world. Decibels refer to squared ADC counts, rounded to
-a
-quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of the size.
+otherwise a single specular reflection would mask the ridge of the static world. Decibels refer to squared ADC counts,
+rounded to a quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of the size.
 """
 
 from abc import ABC, abstractmethod

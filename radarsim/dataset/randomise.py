@@ -9,8 +9,7 @@
 
 Fields that are not named are not drawn: ``randomise: {}`` draws nothing. Normal distributions are truncated at three
 standard deviations. Fields that a building of the data set sets itself (``clutter: 0``), or a variant's mounting, are
-not
-drawn. A draw is keyed by the recording's seed and the field. It depends on no other field or recording, nor on the
+not drawn. A draw is keyed by the recording's seed and the field. It depends on no other field or recording, nor on the
 order in which they are made, and the variants of a recording share it.
 """
 

@@ -27,8 +27,8 @@
 
 A recording is named BUILDING_FLOOR_PLATFORM_NUMBER, plus _VARIANT if there are variants. Its seed depends only on the
 data set's seed and its name without the variant, so a recording stays the same whatever else the data set contains.
-Recordings can follow `waypoints` ([[x, y], ...], m) instead of a tour. `attributes`,
-of the data set, of recordings or of a variant, become attributes of the files.
+Recordings can follow `waypoints` ([[x, y], ...], m) instead of a tour. `attributes`, of the data set, of recordings or
+of a variant, become attributes of the files.
 """
 
 import fnmatch

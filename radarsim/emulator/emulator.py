@@ -20,8 +20,7 @@ from radarsim.emulator.source import NOT_IN_SAMPLES, Source
 from radarsim.emulator.uart import Uart
 
 #: Lag (s) that the radar catches up with after a delay by the machine. If it lags further, or if the source is too
-#: slow,
-#: its clock is set back and frames are late.
+#: slow, its clock is set back and frames are late.
 _CATCH_UP = 0.25
 _ON_TIME = 5e-3  # s
 _WAKE_UP = 1e-3  # s: chirps within this time are sent together, because waking up for each would cost too much

@@ -60,8 +60,7 @@ class GainPattern(NamedTuple):
 
     Attributes:
         azimuth_gain, elevation_gain: gain over the absolute angle in steps of half a degree; the element's gain is
-            their
-            product.
+            their product.
         peak_gain: largest gain in any direction.
     """
 

@@ -25,10 +25,8 @@ def edge_integrals(
         int exp(j pi (t^2 - x^2) / 2) s / (s^2 + t^2) dt from x on,
 
     with s = radius sin(angle), the distance of the edge's line from the path, and x = radius cos(angle), where it
-    begins,
-    in Fresnel units. The contour leaves x at 45 deg into the complex plane, where the phase decays. The result is
-    smooth in
-    both, since s / (s^2 + t^2) is an angle where the phase hardly changes; without phase it is `angle`.
+    begins, in Fresnel units. The contour leaves x at 45 deg into the complex plane, where the phase decays. The result
+    is smooth in both, since s / (s^2 + t^2) is an angle where the phase hardly changes; without phase it is `angle`.
     """
     radius = np.maximum(radius, 1e-6)[:, None, None]
     s, x = radius * np.sin(angle)[:, None], radius * np.cos(angle)[:, None]

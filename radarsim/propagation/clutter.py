@@ -5,21 +5,19 @@ Objects down to 2 cm are meshes (`radarsim.world.generators.small_objects`). Sma
 their radar cross sections have a Weibull distribution: the model of Ram, Singh and Ghatak (IEEE Open J. Signal Process.
 2, 2021) for discrete clutter of rooms. The exponent of the cross section (1: Swerling's; smaller: spikier) is that of
 strong indoor scatterers; log-normal distributions fitted to measured targets in halls (Azim et al., arXiv 2411.03206)
-have tails of that length. Densities and mean were tuned on RadarHD's 25 training walks
-(`benchmarks.realism`), not on its test walks: no measurement of rooms at 77 GHz is published.
+have tails of that length. Densities and mean were tuned on RadarHD's 25 training walks (`benchmarks.realism`), not on
+its test walks: no measurement of rooms at 77 GHz is published.
 
-Energy is conserved. A point and the surface behind it are Lambertian, sigma cos(in) cos(out) with sigma the radar
-cross section at normal incidence: the point takes sigma / 4 of the power on the surface at any incidence, while an
-isotropic point takes the same at grazing incidence, where hardly any power falls on the surface. Cross sections per
-square metre over 4 add up to the fraction that would be scattered without mutual shadowing. The structure of the room
-(frames, recesses, shelves and their contents, services under ceilings: `STRUCTURE`) scatters much more power, but
-little
-of it directly back: its faces are vertical or horizontal. Its echoes come over other surfaces (`reverberation`). Let s
+Energy is conserved. A point and the surface behind it are Lambertian, sigma cos(in) cos(out) with sigma the radar cross
+section at normal incidence: the point takes sigma / 4 of the power on the surface at any incidence, while an isotropic
+point takes the same at grazing incidence, where hardly any power falls on the surface. Cross sections per square metre
+over 4 add up to the fraction that would be scattered without mutual shadowing. The structure of the room (frames,
+recesses, shelves and their contents, services under ceilings: `STRUCTURE`) scatters much more power, but little of it
+directly back: its faces are vertical or horizontal. Its echoes come over other surfaces (`reverberation`). Let s
     be
 the fraction of both. A Poisson field of objects covers 1 - exp(-s) (Chiu, Stoyan, Kendall, Mecke, Stochastic Geometry
-and
-its Applications, 3rd ed., section 3.1), so each has (1 - exp(-s)) / s of its cross section, and the surface reflects,
-scatters and transmits exp(-s) of its power without them (`uncovered`).
+and its Applications, 3rd ed., section 3.1), so each has (1 - exp(-s)) / s of its cross section, and the surface
+reflects, scatters and transmits exp(-s) of its power without them (`uncovered`).
 
 A point has a constant position, cross section and phase, so it is coherent under motion; it is occluded, mirrored and
 seen through panes as any other scatterer, but not from behind its own surface.
@@ -43,8 +41,7 @@ from radarsim.world.shapes import areas, scattered
 #: about 0.2, 3 and 0.1 per square metre.
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
 #: Mean radar cross section of an object without shadowing at normal incidence, m^2 (half of it at 45 deg), and exponent
-#: of
-#: its distribution P(sigma > s) = exp(-(s / scale)^exponent).
+#: of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.01, 0.7
 #: Fraction of the power on any surface that structure would scatter at level 1 without shadowing. Rooms absorb about
 #: half of the power on their surfaces (Andersen et al., see `reverberation`); structure scatters 0.42 of it.
@@ -120,8 +117,7 @@ def densities(
 
 def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
     """Fraction of the power on surfaces that their objects would scatter without mutual shadowing; above 1 where they
-    are
-    many."""
+    are many."""
     return scene.surface_settings.clutter * (STRUCTURE + densities(scene, place, normal) * CROSS_SECTION / 4)
 
 

@@ -14,11 +14,10 @@ and one term per end that decays away from it:
 
 Relative to the centre of the arrays, paths are isometries of the receiver as for plates: a half turn about the nearest
 line of the cylinder, inversions in its ends and in the sphere's nearest point. But that line or point moves over the
-body
-with the sensor, and differs for each pair of antennas; kept constant through a burst it causes a path error of
-delta^2 (1 / h - 1 / (a + h)) for a step delta across, which is 16 deg of phase at 0.3 m. So for each pair and time
-the path is taken over the point whose normal bisects the angle (`path_over`); the error that remains after a few
-iterations enters squared.
+body with the sensor, and differs for each pair of antennas; kept constant through a burst it causes a path error of
+delta^2 (1 / h - 1 / (a + h)) for a step delta across, which is 16 deg of phase at 0.3 m. So for each pair and time the
+path is taken over the point whose normal bisects the angle (`path_over`); the error that remains after a few iterations
+enters squared.
 """
 
 from dataclasses import dataclass

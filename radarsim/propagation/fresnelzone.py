@@ -4,13 +4,12 @@ Behind a screen with openings the amplitude is Fresnel's integral over them, (1 
 of sqrt(lambda d (L - d) / 2L), d along a path of length L. It is summed over the nodes of a Fibonacci lattice on a
 square of these units with smooth borders; on such a lattice a thin pole covers the same number of nodes at any
 orientation (Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show
-whether
-a segment is partly clear, and only then more are tested. Diffraction by obstacles beyond the square is neglected.
+whether a segment is partly clear, and only then more are tested. Diffraction by obstacles beyond the square is
+neglected.
 
 An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. The losses of two screens on one path
 multiply only if they are far apart; in general (Vogler, Radio Science 17(6), 1982, of knife edges) the field is the
-double
-integral over both of
+double integral over both of
 
     exp(j pi (u_1^2 + u_2^2 - 2 rho u_1 . u_2) / (2 (1 - rho^2))),  rho = sqrt(d_1 (L - d_2) / (d_2 (L - d_1))),
 
@@ -95,8 +94,7 @@ def passage(
         observation, flat, obstacles: the frames, the mirrors, and the obstacles.
         segments: segments of the paths. A path of one segment returns on it.
         size: amplitude of each path if it were clear. Slabs, and more than one ray, are tested only for paths far
-            enough
-            above the threshold.
+            enough above the threshold.
     """
     path, strength = segments.path, size[segments.path]
     worth = strength > LEAST_LOSS * observation.threshold
@@ -132,8 +130,7 @@ def _partly(
     strength: Float[np.ndarray, "segment"], factor: Complex[np.ndarray, "segment"],
 ) -> tuple[Int[np.ndarray, "partly"], PathSegments, Float[np.ndarray, "partly"]]:  # fmt: skip
     """Segments that are partly clear, fitted to their mirrors, and the position of the obstacle as a fraction of the
-    whole
-    path."""
+    whole path."""
     long = np.any(segments.begin != segments.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
     smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
@@ -163,8 +160,7 @@ def _reach(
     through: Bool[np.ndarray, "ray"] | None = None,
 ) -> Float[np.ndarray, "ray"]:  # fmt: skip
     """Distance by which clear rays can move towards hidden ones (begin and end of either, m) before they are hidden, as
-    a
-    fraction of the whole distance; `through` as in `Obstacles.clear`."""
+    a fraction of the whole distance; `through` as in `Obstacles.clear`."""
     moved = np.zeros(len(frame))
     for step in 0.5 ** np.arange(1, _HALVINGS + 1):
         begin, end = (a + (moved + step)[:, None] * (b - a) for a, b in zip(one, two, strict=True))
@@ -209,8 +205,7 @@ def _fans(
     smooth: Bool[np.ndarray, "segment"],
 ) -> tuple[Complex[np.ndarray, "segment 2 node"], Passage]:
     """Factors of many rays, zero beyond the mirrors' outlines; which rays are within; and delays, m. Borders between
-    nodes
-    are located for some segments (`smooth`).
+    nodes are located for some segments (`smooth`).
 
     Rays are straight and zones are not: the rays are spread such that they are correct at the obstacle.
     """
@@ -355,9 +350,8 @@ def _open(corners, normal, segments, edges):
 @njit
 def _bounds(corners, normal, segments, i, out):
     """Bounds of the rays that meet all mirrors of a path in their order; a mirror that extends behind another is used
-    only
-    up to the line where their planes meet. Writes linear functions of a node (1, x and y), not negative for such rays;
-    returns their number."""
+    only up to the line where their planes meet. Writes linear functions of a node (1, x and y), not negative for such
+    rays; returns their number."""
     count = 0
     for g in range(3):
         m = segments.mirrors[i, g]

@@ -35,10 +35,8 @@ class Lattice:
         """Build a Fibonacci lattice; `count` and `before` are consecutive Fibonacci numbers.
 
         Weights are those of a square with smooth borders, corrected (least squares) so that half planes of any
-        orientation
-        give Fresnel's integral; otherwise the square's borders would diffract. Near the borders the effect of half
-        planes
-        fades, so that it does not start with a step.
+        orientation give Fresnel's integral; otherwise the square's borders would diffract. Near the borders the effect
+        of half planes fades, so that it does not start with a step.
         """
         k = np.arange(count)
         nodes = HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)

@@ -1,13 +1,12 @@
 """Level of detail: the fraction of a surface's scatterers that is used, depending on distance and antenna gain.
 
 A resolution cell grows with range, so fewer scatterers per square metre give the same speckle; at low antenna gain
-(floor and ceiling nearby), a few are enough, too. So of the scatterers at distance r in a direction of
-amplitude gain g a fraction p = `FULL_DETAIL` / r sqrt(g / g_peak) is used, which keeps the number in a cell constant.
-Each
-scatterer has a rank, drawn once, uniform in 0...1, and is weighted by the amplitude cos(pi rank / 4 p), zero from rank
-2 p on, over its RMS over all ranks. So the mean power is that of all scatterers for any p, and a
-scatterer fades in and out smoothly over a doubling of range: speckle stays coherent along a walk
-(a change of p by dp decorrelates a fraction of about (dp / p)^2 of the power: 0.25 % for 10 cm at 2 m).
+(floor and ceiling nearby), a few are enough, too. So of the scatterers at distance r in a direction of amplitude gain g
+a fraction p = `FULL_DETAIL` / r sqrt(g / g_peak) is used, which keeps the number in a cell constant. Each scatterer has
+a rank, drawn once, uniform in 0...1, and is weighted by the amplitude cos(pi rank / 4 p), zero from rank 2 p on, over
+its RMS over all ranks. So the mean power is that of all scatterers for any p, and a scatterer fades in and out smoothly
+over a doubling of range: speckle stays coherent along a walk (a change of p by dp decorrelates a fraction of about (dp
+/ p)^2 of the power: 0.25 % for 10 cm at 2 m).
 """
 
 import numpy as np

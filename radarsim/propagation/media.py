@@ -3,10 +3,8 @@
 A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material (hollow: a
 cabinet of boards, a stud wall), with inner faces at that depth. A thin closed body is one slab of its own thickness.
 All else is an opaque half space. Reflection and transmission of a slab follow from one formula (ITU-R P.2040-4, eqs.
-42,
-43), Airy's sum over the waves between its faces, at the centre of the sweep. Its phase slope over the middle half of
-the
-sweep is a group delay.
+42, 43), Airy's sum over the waves between its faces, at the centre of the sweep. Its phase slope over the middle half
+of the sweep is a group delay.
 
 With p = exp(-j k d root), root = sqrt(eps - sin^2), a slab of half-space coefficient g has
 
@@ -17,11 +15,11 @@ close for a table. Their phase slopes over the sweep need no unwrapping: that of
 brackets have positive real parts.
 
 A rough surface has a Lambertian part, a lobe about the specular direction, and a lobe back to the source: effective
-roughness (Degli-Esposti, Fuschini, Vitucci, Falciasecca, IEEE TAP 55(1), 2007). Of the diffuse power one
-fraction is Lambertian, one is in a directive lobe ((1 + cos psi_r) / 2)^alpha about the specular
-direction, one in a lobe ((1 + cos psi_i) / 2)^alpha back towards the source. The paper normalises each lobe by its
-integral over the hemisphere, which depends on the angle of incidence and so breaks reciprocity. Here the lobes multiply
-Lambert's cos(in) cos(out) instead, and are normalised at normal incidence, where that integral is largest:
+roughness (Degli-Esposti, Fuschini, Vitucci, Falciasecca, IEEE TAP 55(1), 2007). Of the diffuse power one fraction is
+Lambertian, one is in a directive lobe ((1 + cos psi_r) / 2)^alpha about the specular direction, one in a lobe ((1 + cos
+psi_i) / 2)^alpha back towards the source. The paper normalises each lobe by its integral over the hemisphere, which
+depends on the angle of incidence and so breaks reciprocity. Here the lobes multiply Lambert's cos(in) cos(out) instead,
+and are normalised at normal incidence, where that integral is largest:
 
     sigma(in, out) = sigma0 cos(in) cos(out) (w + w_r ((1 + cos psi_r) / 2)^alpha + w_i ((1 + cos psi_i) / 2)^alpha),
 
@@ -96,8 +94,7 @@ def mirror(layer, cosine):
 @njit(cache=True)
 def window(layer, cosine, share):
     """Transmission coefficients of a slab for TE and TM, relative to the air in its place and as in the beat signal,
-    and
-    the delay of their mean, in units of 1 / k.
+    and the delay of their mean, in units of 1 / k.
 
     Args:
         layer, cosine: see `mirror`.

@@ -2,9 +2,8 @@
 
 Each plate is a scene of its own, at rest in its own frame. Its faces join the flat reflectors of every frame at their
 position at the centre of the burst, and rays that it may obstruct are traced in its own frame. During the burst it
-moves
-by a rigid motion G together with its images: an image of the receiver in a part of the plate, M, becomes G M G^-1, and
-one over several mirrors the product of theirs.
+moves by a rigid motion G together with its images: an image of the receiver in a part of the plate, M, becomes G M
+G^-1, and one over several mirrors the product of theirs.
 """
 
 from dataclasses import replace

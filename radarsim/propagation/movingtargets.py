@@ -2,9 +2,8 @@
 
 Over a burst a scatterer's path length is a parabola through three nodes. Limbs accelerate strongly: compared with exact
 positions in every chirp, a walker's echoes have an error of -40 to -60 dB for most of the step cycle and of -25 dB
-where
-shins swing (measured over one cycle). Ghosts of movers have at most one mirror out and one back; paths over two are
-left out.
+where shins swing (measured over one cycle). Ghosts of movers have at most one mirror out and one back; paths over two
+are left out.
 
 Parts with a material scatter like surfaces of it, and are plates besides (`movingplates`).
 """

@@ -31,8 +31,7 @@ BEAMS = np.linspace(-0.95, 0.95, 96)
 #: paths, such as the two directions of a ghost, share a place.
 STEPS, RISE = 4, 1 / 64
 #: Probes of a cell, in halves of its extent: lateral position or extent, radial, vertical; those that meet a surface
-#: most
-#: often come first.
+#: most often come first.
 _ALL = None
 _PROBES = (
     (_ALL, 0, 0), (0, _ALL, 0),
@@ -145,8 +144,8 @@ class PathTypes:
     def _near_surface(
         self, places: Float[np.ndarray, "place 3"], positions: Float[np.ndarray, "place 3"]
     ) -> Bool[np.ndarray, "place"]:
-        """Whether a surface passes through the cells about some places."""
         """Whether a surface passes through the resolution cell at some places."""
+        real = np.zeros(len(places), bool)
         if self.scene is None or not len(places):
             return real
         extent = self._extents(places - positions)

@@ -31,8 +31,8 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Passage
 from radarsim.propagation.table import Table
 
-#: Numbers of a path's geometry: a and b; matrix | offset by rows; those of a curved surface
-#: (`curved.SpecularPoints`) and a delay, m.
+#: Numbers of a path's geometry: a and b; matrix | offset by rows; those of a curved surface (`curved.SpecularPoints`)
+#: and a delay, m.
 GEOMETRY = SHAPE + 1
 #: Largest number of mirrors on a path: two out and two back, or a chain of three.
 MIRRORS = 4

@@ -34,8 +34,8 @@ class Flat(Table):
         layer: layer of the material (`media.layer`), and the fraction left uncovered by small objects.
         lag: additional delay of the echo at normal incidence, m (`media.lag`).
         finish: unevenness relative to plaster, see `unevenness.FINISHES`.
-        plate, frame: moving plate that they belong to (`movingplates`), and the frame of that position;
-            -1: at rest, in all frames.
+        plate, frame: moving plate that they belong to (`movingplates`), and the frame of that position; -1: at rest, in
+            all frames.
     """
 
     corners: Float[np.ndarray, "facet 4 3"]

@@ -6,9 +6,8 @@ and Propagation Magazine 49(2), 2007). The model is a random walk of waves, as i
 begins at a place on a surface, drawn with a density proportional to the fraction of power that is scattered there (its
 albedo), in a direction with a Lambertian distribution. At each surface the wave is scattered, reflected, transmitted or
 absorbed at random with the probability of the corresponding power fraction. Every place of scattering ends a detour:
-the
-radar's wave is incident on one end, and returns from the other. With A, the area represented by a walk at its start,
-albedos rho, and the antenna's gains G, the power of a detour in one direction is
+the radar's wave is incident on one end, and returns from the other. With A, the area represented by a walk at its
+start, albedos rho, and the antenna's gains G, the power of a detour in one direction is
 
     P / P_t = lambda^2 / (16 pi^3)  A rho_begin rho_end  (G cos / r^2)_begin  (G cos / r^2)_end,
 

@@ -2,12 +2,10 @@
 
 A tessellated surface is exact at its corners. Its normals there follow from the edges: chords of a circle leave one end
 at the angle at which they arrive at the other, (n_a + n_b) . (b - a) = 0, which holds exactly for cylinders and spheres
-of
-any tessellation, and for other smooth surfaces to third order. These equations of all edges are solved by least squares
-together with the means of triangles' normals after Max (J. Graphics Tools 4(2), 1999), so that they hold at borders,
-too.
-The change of the normals over a triangle is its curvature. Noisy corners, as in scans, are first moved onto a cubic
-through their neighbours (osculating jets, Cazals, Pouget, CAGD 22(2), 2005).
+of any tessellation, and for other smooth surfaces to third order. These equations of all edges are solved by least
+squares together with the means of triangles' normals after Max (J. Graphics Tools 4(2), 1999), so that they hold at
+borders, too. The change of the normals over a triangle is its curvature. Noisy corners, as in scans, are first moved
+onto a cubic through their neighbours (osculating jets, Cazals, Pouget, CAGD 22(2), 2005).
 
 Triangles that hardly bend stay flat. A piece ends at creases, and where curvature is discontinuous: where a pipe joins
 its rounded end, the end of the pipe and that of the rounding cancel except for the residual of physical optics.
@@ -31,8 +29,7 @@ COPLANAR = np.deg2rad(0.3)
 #: Smallest number of facets of a piece: fewer are a bend between plates.
 FEWEST = 4
 #: Largest relative difference of the principal curvatures of neighbouring triangles of one piece; a curvature above
-#: this
-#: fraction of the other must have the same sign.
+#: this fraction of the other must have the same sign.
 LIKE, LITTLE = 0.5, 0.15
 #: Smallest area of an uneven plane, m^2; smaller areas remain between the regions of a curved surface.
 UNEVEN = 0.01

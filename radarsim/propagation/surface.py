@@ -2,12 +2,9 @@
 
 The triangles are split until no edge is longer than a metre and grouped into tiles. A tile's scatterers are not stored:
 position, phase and rank of the k-th one follow from the seed, the tile's index and k by hashing. So memory is that of
-the
-triangles, whatever the density; the cost of a frame depends on the surfaces in the radar's reach, not on the size of
-the
-building; and speckle is a property of the world. Within a tile, scatterers follow a low-discrepancy sequence (R2,
-Roberts
-2018) in the order of their ranks, so that any first few of them cover it evenly: see `detail`.
+the triangles, whatever the density; the cost of a frame depends on the surfaces in the radar's reach, not on the size
+of the building; and speckle is a property of the world. Within a tile, scatterers follow a low-discrepancy sequence
+(R2, Roberts 2018) in the order of their ranks, so that any first few of them cover it evenly: see `detail`.
 """
 
 from dataclasses import dataclass, replace

@@ -15,8 +15,8 @@ from radarsim.propagation.surface import Scattering
 class Targets:
     """Scatterers of a batch.
 
-    scatterers: those of the surface, followed by those of moving targets in the first frame, in the second, and so
-        on.
+    Attributes:
+        scatterers: those of the surface, followed by those of moving targets in the first frame, in the second, and so
             on.
         still: number of the surface's scatterers.
         owner: frame of a scatterer; -1: all.

@@ -20,8 +20,7 @@ MARGIN = 0.25
 #: Number of neighbouring reflectors tested together before one by one.
 RUN = 16
 #: Height above its plane from which a reflector is in front of another, m: the faces of an outer edge are not visible
-#: to
-#: one another, however close to the edge a wave passes.
+#: to one another, however close to the edge a wave passes.
 BEFORE = 1e-3
 
 
@@ -31,8 +30,7 @@ class Mirrors(NamedTuple):
     Attributes:
         seen: reflectors with a visible part.
         pairs: visible first reflector, and the second one that waves from the radar can reach over it. Waves return
-            over
-            (a, b) if both (a, b) and (b, a) are pairs, and over (a, b, c) if (a, b) and (c, b) are.
+            over (a, b) if both (a, b) and (b, a) are pairs, and over (a, b, c) if (a, b) and (c, b) are.
     """
 
     seen: Int[np.ndarray, "mirror"]
@@ -168,9 +166,8 @@ def _couple(flat, observation, frame, firsts, order, found):
 @njit(cache=True)
 def _follow(flat, radar, balls, a, window, found):
     """Reflectors that can follow one: each must be in front of the other, and, seen from the radar's image in the
-    first,
-    the second must overlap its window. A fast test of bounding balls, of groups and of each, leaves few for
-    the exact test."""
+    first, the second must overlap its window. A fast test of bounding balls, of groups and of each, leaves few for the
+    exact test."""
     (frame, p), (order, each, runs) = radar, balls
     ca, na, ua, va = vec(flat.center[a]), vec(flat.normal[a]), vec(flat.u[a]), vec(flat.v[a])
     height = dot(minus(p, ca), na)

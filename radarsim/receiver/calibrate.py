@@ -33,8 +33,7 @@ DOMINANCE = 0.95
 #: Distances (m) regarded as the radar's own mount: beyond the leakage, and nearer than any object in a room.
 MOUNT_DISTANCES = (0.1, 0.4)
 #: Amplitude relative to the leakage's, both after the high-pass filter, below which an echo may be the leakage's image
-#: in
-#: an imperfect mixer.
+#: in an imperfect mixer.
 LEFT_OVER = 0.05
 _SNAPSHOTS = 60
 

@@ -141,8 +141,7 @@ class Band(_Strict):
 
     0 at `low`, 1 from 0 to `flat`, 0 from `high` on, linear in between. Noise of real captures falls by 2 to 9 dB in
     the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. The
-    simulator
-    finds echoes up to the closed end of the band, where they fade out smoothly.
+    simulator finds echoes up to the closed end of the band, where they fade out smoothly.
     """
 
     low: float = Field(-0.06, lt=0)
@@ -181,8 +180,7 @@ class FrontEndConfig(_Strict):
             has averaged a faster converter. 12: steps of 16 counts.
         leakage, mismatch, phase_noise: null: none.
         mount: static echoes of the radar's own housing and mount; null: none. The default is the middle of the results
-            of
-            `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
+            of `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
             at 0.14, 0.13 and 0.25 m, one in each.
         if_bandwidth_hz: of the IF amplifier; limits the range where no decimation filter does.
         high_pass: the two first-order stages of the radar configuration.

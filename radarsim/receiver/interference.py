@@ -133,8 +133,7 @@ class Interference:
 
     def _amplitudes(self, motion: Motion, time: float) -> list[complex]:
         """Amplitude of each radar: square root of its power at an RX over the power that the disturbed radar transmits,
-        in
-        the middle of the burst."""
+        in the middle of the burst."""
         middle = np.array([time + self.config.burst_center])
         here, rotation = motion.position(middle), motion.rotation(middle).as_matrix()
         there = np.array([other.places(middle[0]) for other in self.interferers])
@@ -153,8 +152,7 @@ class Interference:
 
     def _sweeps(self, other: Interferer, motion: Motion, time: float) -> Sweeps:
         """Chirps at the mixer's output: another radar's in each of the frame's chirps (in order of loop and tx), for
-        each
-        candidate of the other's chirps that may fall into it, and each rx."""
+        each candidate of the other's chirps that may fall into it, and each rx."""
         config, theirs, rate = self.config, other.radar, 1 + 1e-6 * other.clock_ppm
         own = time + (config.chirp_times.ravel() - config.adc_center_time)  # start of each ramp, s
         ends = own[:, None] + [0, config.ramp_end_time]

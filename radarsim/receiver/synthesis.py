@@ -124,12 +124,10 @@ class _Axes(NamedTuple):
 @njit(parallel=True, cache=True)
 def _waves(lengths, amplitudes, axes):
     """Cell of each echo; parabolas over the loop number of its phase (cycles) and of its tone relative to the cell
-    (bins), by
-    echo, coefficient (three of each) and antenna; and the largest distance of a tone from its cell.
+    (bins), by echo, coefficient (three of each) and antenna; and the largest distance of a tone from its cell.
 
     Cells repeat after N bins, but phases refer to the instant n_c = (N - 1) / 2, at which a tone N bins higher has
-    turned
-    n_c cycles further.
+    turned n_c cycles further.
     """
     echoes, virtual, _ = lengths.shape
     step = axes.step

@@ -86,8 +86,7 @@ class Batches:
         Args:
             spans: first frame of each batch, and the frame after its last.
             workers: number of processes, at most one per batch; 1: this process only; None: one per core, if the number
-                of
-                batches justifies it.
+                of batches justifies it.
 
         Raises:
             InputError: see `made`, or a process died.

@@ -40,8 +40,8 @@ def simulate(
         scene: a scene, its YAML file, or the name of a scene of the project.
         output: recording to write.
         workers: number of processes that compute frames, 16 at a time; 1: this process only; None: one per core, fewer
-            where starting them would take longer than they save. A script that uses more than 1 needs an
-            ``if __name__ == "__main__"``, as always with multiprocessing.
+            where starting them would take longer than they save. A script that uses more than 1 needs an ``if __name__
+            == "__main__"``, as always with multiprocessing.
         progress: called with (frames done, total frames).
         plan: options of the simulation, the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
             trajectory, waypoints, mounting, people.
@@ -75,8 +75,7 @@ def planned(
         radar: preset, configuration file or configuration.
         frontend: front end or its file (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
         sensors: sensors beside the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. They do not affect
-            the
-            radar's samples.
+            the radar's samples.
         people: number of pedestrians near the radar's path (see `with_pedestrians`).
         walk_in: scene in which the walk is planned; default: `scene`.
         walk: path of the radar, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.

@@ -97,8 +97,7 @@ class Stereo:
         scale = np.float32(self.focal_length * self.baseline)
         disparity = scale / np.asarray(depth, np.float32)
         # Columns in the right imager's picture, left to right. A point is occluded there if a point further right in
-        # the
-        # left picture falls on its column or left of it.
+        # the left picture falls on its column or left of it.
         column = np.arange(camera.width, dtype=np.float32) - disparity * np.float32(camera.fx / self.focal_length)
         nearest = np.minimum.accumulate(column[..., ::-1], axis=-1)[..., ::-1]
         seen = (column > -0.5) & (depth >= self.nearest)

@@ -1,11 +1,9 @@
 """Path type of each cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, moving objects.
 
 The map of each path type equals `radarize.signal.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part
-of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the
-window's transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; a few
-instants
-of the burst suffice, because the map sums over Doppler, which equals the mean over loops. Left out are noise,
-converter,
+of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
+transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; a few instants of the
+burst suffice, because the map sums over Doppler, which equals the mean over loops. Left out are noise, converter,
 channel mismatch (which calibration removes), and the smear over azimuth of echoes whose closing speed exceeds
 `RadarConfig.max_velocity`, whose delays between transmitters the map compensates at the wrong speed.
 """

@@ -3,8 +3,7 @@
 Its visual-inertial odometry observes gravity, but drifts in heading and scale: steps are summed with a scale error of
 0.5 % (standard deviation, constant) and a heading error with a random walk of 0.03 degrees per sqrt(s); every pose has
 white noise of a millimetre and 0.02 degrees. The final error is mostly within 1 % of the distance travelled, as its
-data
-sheet specifies for closed loops.
+data sheet specifies for closed loops.
 """
 
 from functools import cached_property

@@ -1,6 +1,5 @@
 """Comparison of a recording with its twin, frame by frame: the same radar on the same walk, in the real place and in
-its
-model (`radarsim twin`).
+its model (`radarsim twin`).
 
 Maps are those that networks get (`radarize.signal.maps`), in dB relative to their median, so that the receiver's gain,
 which is compared separately, and the noise of empty cells have no influence. Velocities and scans are estimated without
@@ -70,8 +69,7 @@ class Comparison:
         velocity: of recording, twin, and poses (NaN if unknown), m/s, forward and left; none of a single antenna.
         scans: of recording and twin on `BEARINGS`, m, inf without a return; empty for a single antenna.
         alignment: mean correlation of range-azimuth maps over shifts of the twin: for each kind of shift, the shifts
-            (s,
-            rad, m) and the correlations.
+            (s, rad, m) and the correlations.
         frechet: by map, Fréchet distance of patch statistics: between recording and twin, and, for scale, between the
             recording's two halves, dB.
     """

@@ -3,8 +3,7 @@ statistics of their patches and the Fréchet distance.
 
 Sets are compared as in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019):
 patches are the samples, so that a single frame has a distribution, too. Features are levels and contrasts in dB instead
-of
-a network's.
+of a network's.
 """
 
 import numpy as np
@@ -44,8 +43,7 @@ def similarity(
     one: Float[np.ndarray, "frame row column"], other: Float[np.ndarray, "frame row column"]
 ) -> Float[np.ndarray, "frame"]:
     """MS-SSIM of each pair of maps of 0...`DEPTH` dB, at as many of its five scales as the smaller side allows; NaN if
-    it
-    allows none."""
+    it allows none."""
     from torchmetrics.functional.image import multiscale_structural_similarity_index_measure as ms_ssim
 
     side = min(one.shape[1:])
@@ -67,8 +65,7 @@ def similarity(
 
 def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame patch 5"]:
     """Statistics of patches that overlap by half: quantiles of their levels relative to the map's mean, as networks get
-    them
-    (`radarize.learning.nets.maps.level`), and mean absolute steps between rows and between columns, dB.
+    them (`radarize.learning.nets.maps.level`), and mean absolute steps between rows and between columns, dB.
 
     Args:
         maps: dB, at least `PATCH` large.

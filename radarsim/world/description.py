@@ -23,9 +23,8 @@ an entry with an existing name (``*`` and ``?`` are wildcards) changes the field
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
 ``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1, the default of buildings,
-is typical of rooms in use; 0, the default of scenes without a building, is bare, flat and square. Clutter adds
-objects to the scene (`small_objects`). ``furniture`` is the number of pieces in a building's rooms relative to the
-usual;
+is typical of rooms in use; 0, the default of scenes without a building, is bare, flat and square. Clutter adds objects
+to the scene (`small_objects`). ``furniture`` is the number of pieces in a building's rooms relative to the usual;
 ``materials`` has factors on materials' permittivity and conductivity: ``{wood: {permittivity: 1.1}}``. ``interferers``
 are other radars that transmit in the scene (`interferers`); levels can change and add them, too.
 """

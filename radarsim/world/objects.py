@@ -44,8 +44,7 @@ class SceneObject:
         self, place: Float[np.ndarray, "face 3"], normal: Float[np.ndarray, "face 3"]
     ) -> Bool[np.ndarray, "face"]:
         """Mask of its faces, with centres (m) and normals, that are floor or ceiling: all, if it has no others; for a
-        room
-        in one mesh, those at its bottom that face up and those at its top that face down."""
+        room in one mesh, those at its bottom that face up and those at its top that face down."""
         (low, high), up = self.mesh.bounds[:, 2], normal[:, 2]
         seen_from_within = self.two_sided or (self.mesh.is_watertight and self.mesh.volume < 0)
         if self.is_floor_or_ceiling or high - low < _ROOM or not seen_from_within:

@@ -1,12 +1,11 @@
 """Flat regions of a mesh, noisy scans included, and the quadrilaterals that cover them.
 
-A scanned wall is thousands of triangles with errors of a millimetre and a few degrees. Each by itself would be a
-mirror with another direction, and the wall would scatter diffusely. So neighbouring triangles are joined as long as
-they
-are near one plane, and the region reflects as that plane. The residual, the distance of the corners from the plane, is
-an artefact of scanning (half a millimetre RMS would cost 11 dB as roughness) that cannot be distinguished from true
-roughness by its size; true roughness is the material's, so the residual is ignored. In regions that
-bend within a Fresnel zone only the exactly flat parts are planes.
+A scanned wall is thousands of triangles with errors of a millimetre and a few degrees. Each by itself would be a mirror
+with another direction, and the wall would scatter diffusely. So neighbouring triangles are joined as long as they are
+near one plane, and the region reflects as that plane. The residual, the distance of the corners from the plane, is an
+artefact of scanning (half a millimetre RMS would cost 11 dB as roughness) that cannot be distinguished from true
+roughness by its size; true roughness is the material's, so the residual is ignored. In regions that bend within a
+Fresnel zone only the exactly flat parts are planes.
 """
 
 from collections.abc import Iterator, Sequence

@@ -251,8 +251,7 @@ def _lent(values: np.ndarray, dtype: type) -> np.ndarray:
 
 def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
     """Array with padding at its end: Dr.Jit reads NumPy's memory in place in whole packets, which could otherwise
-    extend
-    beyond the memory that the process may read."""
+    extend beyond the memory that the process may read."""
     size = int(np.prod(shape))
     room: np.ndarray = np.empty(size + _PACKET, dtype)
     room[size:] = 0

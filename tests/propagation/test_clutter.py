@@ -80,8 +80,7 @@ def sphere(steps=45):
 
 def scattered(points, normal, source):
     """Fraction of the power from `source` on the square that its points scatter: their bistatic cross sections over 4
-    pi,
-    integrated over the sphere. All points have the same pattern up to a factor."""
+    pi, integrated over the sphere. All points have the same pattern up to a factor."""
     for column in (points.normal, points.lobe, points.two_sided):
         assert np.all(column == column[0])
     face, lobe, two_sided = points.normal[0], points.lobe[0], points.two_sided[0]

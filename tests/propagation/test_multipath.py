@@ -333,8 +333,7 @@ def test_a_corner_behind_a_pane(moving, angle):
 
 def test_all_phantoms_behind_a_pane():
     """A target in a corner of two walls, all behind 6 mm of glass: every pair of paths, over one mirror, over two,
-    direct,
-    as without the pane, times its transmission of both paths."""
+    direct, as without the pane, times its transmission of both paths."""
     walls = [sheet("left", "metal", (2.7, 1.2, 0), (3.0, 2.4), (0, -1, 0)), AT_END]
     pane = sheet("pane", "glass", (0.8, 0, 0), (6.0, 4.0), (-1, 0, 0))
     place = np.array([2.4, 0.5, 0.0])

@@ -87,8 +87,7 @@ def test_ghosts_of_round_bodies(kind):
 
 def pole_ghosts(bottom, tilt):
     """Ghosts of a pole 2 m off over a metal floor, up to 0.7 m and tilted (deg), and the integral over the part above
-    the
-    floor, both as the sum of the two orders of floor and pole."""
+    the floor, both as the sum of the two orders of floor and pole."""
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
     pole = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])

@@ -3,8 +3,7 @@
 Unfolded at the mirrors of its two paths, the radar transmits from one image and receives at another. Between the two,
 the wave takes the shortest path over the body, by the point P whose normal bisects the angle. Its strength follows from
 the Hessian of the path's length at P (stationary phase): an infinite plane there would have 1 / (r_1 + r_2) and the
-Hessian
-H_0 = (1 / r_1 + 1 / r_2) (1 - t t'), t the tangential part of the direction; a body of curvature C has
+Hessian H_0 = (1 / r_1 + 1 / r_2) (1 - t t'), t the tangential part of the direction; a body of curvature C has
 
     1 / (r_1 + r_2) sqrt(det H_0 / det H),  H = H_0 + 2 cos(theta) C,
 

@@ -26,8 +26,7 @@ from radarsim.propagation.paths import Kind, Paths
 #: Largest number of mirrors on the paths out and back together.
 MOST_BOUNCES = 2
 #: Smallest area of mirrors, m^2, for paths over two of them: at 2 m a Fresnel zone takes 0.02. Pairs of smaller ones
-#: are
-#: much more numerous and contribute little.
+#: are much more numerous and contribute little.
 LEAST_TWICE = 0.05
 
 

@@ -1,11 +1,9 @@
 """Echoes over two or three mirrors without a scatterer: images of the radar itself, including corner reflectors.
 
 A chain m_1 ... m_k maps the receiver to M rx, M = R_1 ... R_k the product of the reflections, and the echo's path
-length
-is |tx - M rx|, straight through the mirrors unfolded along it. Two mirrors at right angles make M a half turn about
-their
-edge, and three an inversion in their corner; the path passes the edge or corner itself for every position of the radar,
-and each order of the mirrors has its own part of the wave.
+length is |tx - M rx|, straight through the mirrors unfolded along it. Two mirrors at right angles make M a half turn
+about their edge, and three an inversion in their corner; the path passes the edge or corner itself for every position
+of the radar, and each order of the mirrors has its own part of the wave.
 
 The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts according
 to its offset x over sqrt(lambda d (L - d) / (2 L)) (Fresnel), so in these units the apertures of a chain overlap to one

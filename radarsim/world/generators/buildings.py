@@ -4,8 +4,7 @@
     building: {kind: office, seed: 7, length: 18}
 
 The seed determines what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor number
-varies
-rooms, doors (`layout`) and furniture (`furnishing`). World origin at the south-west corner, floor at z = 0.
+varies rooms, doors (`layout`) and furniture (`furnishing`). World origin at the south-west corner, floor at z = 0.
 """
 
 from abc import ABC, abstractmethod

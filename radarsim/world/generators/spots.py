@@ -21,8 +21,7 @@ NARROW, SEAM = 0.5, 0.02
 #: Cosines for horizontal and for vertical surfaces.
 LEVEL, UPRIGHT = 0.98, 0.05
 #: Materials of buildings. At the height of tops their surfaces are steps, landings or sills of openings, on which
-#: nothing
-#: is placed.
+#: nothing is placed.
 BUILT = {"concrete", "brick", "plasterboard", "ceiling board", "asphalt", "carpet", "floorboard"}
 #: m: distance from which a ray looks back at a surface, and tolerance of its end.
 LIFT, OFF = 0.01, 0.002
@@ -40,8 +39,7 @@ _THREE, _OUT = (-1.0, 0.0, 1.0), (0.15, 0.55, 1.0)
 
 def _through(side: int) -> Float[np.ndarray, "ray 2 3"]:
     """Ends of rays through the space of an object, a grid of `side` by `side` rays: fractions of half its sides, and of
-    its
-    depth."""
+    its depth."""
     rows = np.linspace(-1, 1, side)
     return np.array(
         [[(x, y, 0.0), (x, y, 1.0)] for x, y in product(_THREE, repeat=2)]

@@ -52,8 +52,7 @@ def faces(solids: list[Span], openings: list[Span], pillars: Sequence[Span] = ()
     """Boundary of the union of `solids` minus the union of `openings`, apart from its lowest and highest plane.
 
     Those two are floor and ceiling, which belong to the rooms. Vertical faces are extended in height first, then in
-    width.
-    `pillars` are solid everywhere, in openings too.
+    width. `pillars` are solid everywhere, in openings too.
     """
     boxes = np.array([*solids, *openings, *pillars], float).round(6)
     grid = [np.unique(boxes[:, [axis, axis + 3]]) for axis in range(3)]

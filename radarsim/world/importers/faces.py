@@ -2,9 +2,8 @@
 
 Faces are borders between occupied cells and free ground. Border points with similar directions are grown into straight
 segments (as line segments in images: von Gioi et al., LSD, IEEE TPAMI 32(4), 2010), collinear segments are joined
-across
-gaps too narrow to walk through, and each face is aligned to the building's main directions if that moves its ends by no
-more than about a cell. Faces that meet share their corner.
+across gaps too narrow to walk through, and each face is aligned to the building's main directions if that moves its
+ends by no more than about a cell. Faces that meet share their corner.
 """
 
 from dataclasses import dataclass

@@ -14,8 +14,7 @@ from jaxtyping import Int
 from radarsim.world.importers.part import Part
 
 #: Smallest height of a room, m, and smallest mean width, twice its volume over its surface, m: a closed mesh of walls
-#: alone
-#: encloses everything, too, but is only as wide as the walls are thick.
+#: alone encloses everything, too, but is only as wide as the walls are thick.
 _HIGH, _WIDE = 1.8, 0.6
 #: Tolerance of the enclosure, m.
 _BEYOND = 0.3

@@ -52,8 +52,8 @@ def blueprint(scene: Scene) -> "Figure":
 
     cut = Section.of(scene, height)
     for area, owner in cut.areas(scene):
-        # The cut is black, as usual; the faces of walls have the colours of their materials.
-        # The reveals of an opening are lower than the wall that they bound.
+        # The cut is black, as usual; the faces of walls have the colours of their materials. The reveals of an opening
+        # are lower than the wall that they bound.
         face = "0.2" if wall[owner] or area.area > 1.0 else colors[owner]
         for ring in _filled(area):
             axes.fill(*ring.T, facecolor=face, edgecolor="none", zorder=3)

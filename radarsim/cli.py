@@ -9,7 +9,7 @@ from radarize.io.console import new_app, print_table, progress, run, working
 from radarize.io.errors import InputError
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
-scene_app = typer.Typer(help="Look at a scene without simulating it.", no_args_is_help=True)
+scene_app = typer.Typer(help="Show, import and export scenes.", no_args_is_help=True)
 app.add_typer(scene_app, name="scene")
 
 SceneName = Annotated[
@@ -56,8 +56,7 @@ def simulate(
         int | None, typer.Option(min=1, help="Number of processes; default: one per core, fewer if short.")
     ] = None,
 ) -> None:
-    """Simulate a walk through SCENE and write a recording with ground truth. An interrupted command can be repeated and
-    continues."""
+    """Simulate a walk through SCENE and write a recording with ground truth; an interrupted run is resumed."""
     plan: Any = {name: value for name, value in locals().items() if name not in ("scene", "output")}
     from radarize.io.recording import keeping
     from radarize.radar.cfg import remarks
@@ -82,9 +81,9 @@ def dataset(
     plan: Annotated[bool, typer.Option("--plan", help="Print the parameters of each recording and stop.")] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Number of processes; default: one per core.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Ray cluster; auto: on this machine.")] = None,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace recordings of other parameters.")] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace recordings with other parameters.")] = False,
 ) -> None:
-    """Simulate the recordings of a data set. An interrupted command can be repeated and continues."""
+    """Simulate the recordings of a data set; an interrupted run is resumed."""
     from radarsim.dataset.plan import print_plan
     from radarsim.dataset.run import make
     from radarsim.dataset.specification import Specification
@@ -340,7 +339,7 @@ def emulate(
 def doctor(
     report: Annotated[bool, typer.Option("--report", help="Print a text for bug reports instead.")] = False,
 ) -> None:
-    """Check what this machine lacks for simulation and print how to install it."""
+    """Check the machine for everything that simulation needs, and print how to install what is missing."""
     from radarsim.doctor import describe, examine
 
     if report:

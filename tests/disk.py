@@ -1,4 +1,4 @@
-"""Small disks, and full ones."""
+"""Small and full disks."""
 
 import errno
 import os
@@ -28,7 +28,7 @@ def disk(folder: Path, size: int, image: Path | None = None) -> Iterator[Path]:
 
 
 def fill(path: Path) -> None:
-    """Take all room that a disk has left, for a file."""
+    """Fill a disk with a file."""
     with path.open("wb", buffering=0) as file:
         size = 1 << 30
         while size >= 1 << 12:

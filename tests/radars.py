@@ -19,6 +19,6 @@ def radar(board: str | Path) -> RadarConfig:
 
 
 def tells_elevation(config: RadarConfig) -> bool:
-    """Whether a board's antennas stand in more than one row."""
+    """Whether a board's antennas are in more than one row."""
     board = load_board(config.board)
     return len({height for _, height in board.tx}) * len({height for _, height in board.rx}) > 1

@@ -1,4 +1,4 @@
-"""What depends on what, and how much a function takes."""
+"""Dependences between packages, and limits on their size and on arguments of functions."""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""Commands to a DCA1000 that answers, refuses, or is not there."""
+"""Commands to a DCA1000 that answers, refuses, or is absent."""
 
 import socket
 import threading

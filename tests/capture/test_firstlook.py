@@ -1,4 +1,4 @@
-"""The check of a stream's first seconds."""
+"""Check of a stream's first seconds."""
 
 import numpy as np
 

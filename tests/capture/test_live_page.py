@@ -1,4 +1,4 @@
-"""Who may look at the live page."""
+"""Access control of the live page."""
 
 import socket
 
@@ -9,7 +9,7 @@ from radarize.capture.page import LivePage
 
 
 def asked(page: LivePage, *headers: str, path: str = "/") -> str:
-    """The first line of the answer to a request with such headers."""
+    """First line of the answer to a request with given headers."""
     with connected(page) as client:
         client.sendall("\r\n".join([f"GET {path} HTTP/1.1", *headers, "", ""]).encode())
         return client.makefile().readline().strip()

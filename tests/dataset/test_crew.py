@@ -1,4 +1,4 @@
-"""The run of a data set, whatever makes its recordings: progress, failures, killed workers, resuming, refusals."""
+"""Run of a data set with fake recordings: progress, failures, killed workers, resuming, refusals."""
 
 import os
 import shutil
@@ -25,7 +25,7 @@ def made(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    """Recordings that this process has made."""
+    """Recordings made in this process."""
     folder = tmp_path_factory.mktemp("undisturbed")
     for name in "abcd":
         fake(name).make(folder, lambda done, total: None)
@@ -46,7 +46,7 @@ def test_every_recording_is_made_once(undisturbed, tmp_path):
 
 
 def test_failures_do_not_stop_the_others(undisturbed, tmp_path):
-    """A bad tour, a bug, and a process that is killed each time: named, and nothing half-written stays."""
+    """A bad tour, a bug, and a process that is killed every time: all are reported, and no partial recording stays."""
     tasks = fake("a", "fails"), fake("b", "breaks"), fake("x", "killed"), fake("c"), fake("d")
     lines = []
     outcome = make(FakeSpecification(*tasks), tmp_path, workers=1, log=lines.append)
@@ -87,7 +87,7 @@ def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
 
 
 def test_a_full_disk_ends_the_run(small_disk):
-    """Whatever the system's language, for the worker's error carries what it is; a room without space does not."""
+    """In any system language, because the worker's error has a code; a room without space is a different error."""
     tasks = fake("a", "small rooms"), fake("b"), fake("c", "full disk"), fake("d")
     with pytest.raises(DiskFull, match="no space left on the device; 1 of 4 recordings are finished"):
         make(FakeSpecification(*tasks), small_disk, workers=1, log=lambda line: None)
@@ -102,8 +102,8 @@ def test_recordings_of_other_physics_are_named_and_made_anew(tmp_path, monkeypat
 
 
 def test_physics_are_the_sources_wherever_they_are(tmp_path):
-    """Installed, without what was compiled, they have the same digest; with a changed line of the propagation another,
-    of a report not."""
+    """The digest is the same after installation, without compiled files; a changed line of propagation changes it, one
+    of a report does not."""
     for package in ("radarsim", "radarize"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
     shutil.copytree(ROOT / "scenes", tmp_path / "radarsim" / "scenes")

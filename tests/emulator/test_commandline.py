@@ -29,7 +29,7 @@ class FakeRadar:
 
 
 def configured(radar: FakeRadar, **replaced: str) -> CommandLine:
-    """A command line that has had the preset's commands, some of them replaced."""
+    """Command line that has received the preset's commands, some of them replaced."""
     line = CommandLine(radar)
     for command in LINES:
         answer = line.execute(replaced.get(command.split()[0], command))

@@ -16,7 +16,7 @@ from tests.virtual import BOARD, COMPUTER, CONFIG, emulator, record
 
 
 def test_xwr_captures_what_was_recorded(tmp_path):
-    """The client `xwr` (PyPI), from the command line's emulator: configures, captures, gets the samples."""
+    """The client `xwr` (PyPI) configures the emulator of the command line, captures, and gets the recorded samples."""
     from xwr import DCAConfig, XWRConfig, XWRSystem
 
     adc = record(tmp_path / "r.h5", CONFIG, 25)
@@ -42,7 +42,7 @@ def test_xwr_captures_what_was_recorded(tmp_path):
 
 
 def test_our_own_capture_loses_nothing(tmp_path):
-    """The preset `radarize`, 30 frames/s for two seconds, both command lines in processes of their own."""
+    """The preset `radarize` at 30 frames/s for two seconds, with both command lines in separate processes."""
     preset = PRESETS["radarize"]
     adc = record(tmp_path / "r.h5", preset, 30)
     with emulator(tmp_path / "r.h5", tmp_path, "--loop") as running:

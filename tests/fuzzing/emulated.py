@@ -14,7 +14,7 @@ from tests.fuzzing.reader import CONFIG, Reader
 
 
 def command_line() -> Reader:
-    """A session: a whole configuration and a start, misspelled, and on from there."""
+    """Session on the serial port: a configuration and a start, misspelled, and further commands."""
     whole = write_cfg(CONFIG)
 
     def read(text: str) -> None:
@@ -29,7 +29,7 @@ def command_line() -> Reader:
 
 
 def board() -> Reader:
-    """Requests, damaged, one after another."""
+    """Sequence of damaged requests."""
     sound = [Request(command).encode() for command in Opcode]
     sound += [
         Request(Opcode.CONFIGURE, RAW_TWO_LANES).encode(),

@@ -21,7 +21,7 @@ def walk():
 
 
 def places(scene: Scene) -> np.ndarray:
-    """Of people's trunks, (person, time, 3), m."""
+    """Positions of people's trunks, (person, time, 3), m."""
     return np.stack([who.poses(TIMES)[1][:, 0] for who in scene.movers])
 
 

@@ -129,7 +129,7 @@ def test_hand_faces_other_ways_and_wheels_follow_their_line(tours):
 
 @pytest.mark.parametrize("platform", list(PLATFORMS))
 def test_no_jerk(tours, platform):
-    """Muscles and motors take time: acceleration never jumps, though gait makes it swing."""
+    """Acceleration is continuous, also with gait: muscles and motors need time."""
     t = np.arange(0, DURATION, 0.01)
     most = {"handheld": 60.0, "cart": 6.0, "robot": 6.0}[platform]
     for seed in SEEDS:
@@ -138,7 +138,8 @@ def test_no_jerk(tours, platform):
 
 
 def test_hand_comes_back(tours):
-    """Somewhere in each tour the hand is within a metre of where it was ten or more seconds and five metres before."""
+    """In each handheld tour the sensor returns to within a metre of a place visited at least ten seconds and five
+    metres before."""
     t = np.arange(0, DURATION, 0.25)
     for seed in SEEDS:
         motion = tours["handheld", seed]

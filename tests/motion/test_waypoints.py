@@ -23,7 +23,7 @@ def office() -> Scene:
 
 @pytest.fixture(scope="module")
 def rooms(office) -> np.ndarray:
-    """Places in four rooms and the corridor that a person can stand at, found by looking for a free square metre."""
+    """Free places in four rooms and the corridor at which a person can stand."""
     things = obstacles(office)
     rng = np.random.default_rng(0)
     found = [[9.0, 6.0]]
@@ -119,7 +119,7 @@ def test_places_nobody_can_stand_at(office, place, message):
 
 
 def test_places_behind_a_closed_door(tmp_path):
-    """Two rooms with a wall between."""
+    """Two rooms separated by a wall."""
     (tmp_path / "cells.yaml").write_text(
         "objects:\n"
         "  - {name: floor, shape: box, size: [8, 4, 0.1], position: [0, 0, -0.05], material: concrete}\n"
@@ -133,7 +133,7 @@ def test_places_behind_a_closed_door(tmp_path):
 
 
 def test_the_recording_tells_its_motion(tmp_path):
-    """Through way-points at the command line, cut short; and along poses through a wall."""
+    """Statistics of a recording: through way-points on the command line, cut short; and along poses through a wall."""
     from radarsim.cli import app
 
     (tmp_path / "way.csv").write_text("0 0\n1 0.5\n")

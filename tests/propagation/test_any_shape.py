@@ -56,7 +56,7 @@ def area(corners):
 @example(shapes.cylinder((0, 0, 0), 0.005, 0.7, 48), (3.9, -34.4, -18.8), "metal")
 @example(shapes.cylinder((0, 0, 0), 0.4032, 0.0274, 57), (-93.9, 74.6, -115.6), "metal")
 def test_any_shape_is_covered_and_found(mesh, rotation, material):
-    """Plates cover 99 % of what is flat and nothing else, and a frame of finite echoes comes from it."""
+    """Plates cover 99 % of the flat area and nothing else, and a frame has finite echoes."""
     mesh = shapes.placed(mesh, (2, 0, 1), np.deg2rad(rotation))
     scene = Scene("one", [SceneObject("body", mesh, MATERIALS[material]), FLOOR])
     reflectors = Reflectors.of(scene, CONFIG)

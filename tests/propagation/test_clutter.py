@@ -61,7 +61,7 @@ SIDE = 60.0
 
 
 def lone(kind, level):
-    """A square of 60 m, high over the lowest point of the scene as its kind asks."""
+    """Square of 60 m, at the height above the scene's lowest point that its kind requires."""
     center, facing_, material, _ = KINDS[kind]
     objects = [
         SceneObject("square", shapes.rectangle(center, (SIDE, SIDE), facing_), MATERIALS[material]),
@@ -101,7 +101,8 @@ def everything(found):
 
 
 def test_densities_by_what_things_are_on():
-    """Counts are Poisson's about density times area, with the level; each near its surface, on its outside."""
+    """Numbers are Poisson-distributed about density times area and level; each point is near its surface, on its
+    outside."""
     z = np.concatenate([everything(clutter(room(2.0), seed)).position for seed in range(40)])
     ranges = {
         "floor": ((z[:, 2] < 0.4) & (z[:, 0] < 11.6), ON_FLOORS * 116),
@@ -119,7 +120,8 @@ def test_densities_by_what_things_are_on():
 
 @pytest.mark.parametrize("level", [0.5, 5.0])
 def test_cross_sections_are_weibulls(level):
-    """Their law, and so the power a square metre of wall sends back: density times mean, less what is in shadow."""
+    """Distribution of cross sections, and the mean power per square metre of wall: density times mean, less
+    shadowing."""
     sigma = np.concatenate([everything(clutter(lone("wall", level), seed)).sigma for seed in range(3)])
     share = level * (STRUCTURE + ON_WALLS * CROSS_SECTION / 4)
     mean = CROSS_SECTION * (1 - np.exp(-share)) / share
@@ -137,7 +139,7 @@ def test_those_seen_over_mirrors_have_the_power_of_all():
 
 
 def test_same_things_from_everywhere():
-    """They belong to the world and its seed, not to who looks."""
+    """Points depend on the world and its seed, not on the sensor's position."""
     one = clutter(room())
     here, there = (one.near(np.array([[x, 0.0, 1.0]]), 4.0) for x in (5.0, 6.0))
     rows = [set(map(tuple, np.column_stack([s.position, s.sigma, s.phase]))) for s in (here, there)]
@@ -150,7 +152,7 @@ def test_same_things_from_everywhere():
 
 
 def test_coherent_under_motion():
-    """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
+    """An echo's phase changes by 2k times the motion towards its point in any direction, without new random numbers."""
     found = PathFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
     step = np.array([0.004, -0.003, 0.002])
     start = np.array([3.0, 0.5, 1.0])
@@ -205,8 +207,8 @@ def test_more_than_memory_holds():
 @pytest.mark.parametrize("level", [0, 0.5, 1, 3])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_surface_gives_more_than_falls_on_it(kind, level):
-    """What the mirror reflects, the rough surface, structure and the things on it scatter, and passes, from head-on to
-    80 deg."""
+    """Specular, diffuse and transmitted power, and that scattered by structure and objects, together do not exceed the
+    incident power, from normal incidence to 80 deg."""
     of_things = KINDS[kind][3] * CROSS_SECTION / 4
     center, normal = (np.array(x, float) for x in KINDS[kind][:2])
     scene, bare = lone(kind, level), lone(kind, 0)
@@ -239,7 +241,7 @@ def test_no_surface_gives_more_than_falls_on_it(kind, level):
 
 @pytest.mark.parametrize(("kind", "decibel"), [("wall", -1.2), ("desk", -1.2), ("floor", -1.1), ("ceiling", -1.1)])
 def test_mean_return_at_45_degrees(kind, decibel):
-    """At level 1 a square metre returns 0.005 m^2 a thing at 45 deg, less what stands in the shadow of others."""
+    """At level 1 each object of a square metre returns 0.005 m^2 at 45 deg on average, less the shadowing by others."""
     things = everything(clutter(lone(kind, 1.0), 3))
     cosine = np.cos(np.pi / 4)
     returned = np.sum(things.sigma * scattering(cosine, cosine, 1.0, things.lobe[0])) / SIDE**2

@@ -123,7 +123,7 @@ def test_a_lamp_is_seen_over_a_door():
 
 
 def test_chains_over_a_door():
-    """A door at an angle to a metal wall: the same images of the radar."""
+    """A door at an angle to a metal wall: the same images of the radar as over a static door."""
     stands, moves = both(50.0, [SIDE])
     ghosts = stands.where(bounces=2, through=False, moving=False)
     assert len(ghosts)
@@ -133,7 +133,7 @@ def test_chains_over_a_door():
 
 
 def reflection(mover, t):
-    """That in the face of a door that is turned to the origin: matrix and offset."""
+    """Reflection in the face of a door turned to the origin: matrix and offset."""
     low, high = np.deg2rad(mover.angles)
     angle = (low + high) / 2 - (high - low) / 2 * np.cos(2 * np.pi * t / mover.period)
     normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
@@ -145,7 +145,8 @@ TX, RX = tx_positions(CONFIG), rx_positions(CONFIG)
 
 
 def test_its_reflection_moves_as_the_door_does():
-    """Its path, antenna by antenna, at the burst's ends and in its middle; its speed is that of the foot, twice."""
+    """Path length of every antenna at the burst's ends and centre; its rate is twice the speed of the specular
+    point."""
     mover = swinging(90.0)
     echoes = finder([], [mover])(HERE, AHEAD, MIDDLE)
     strongest = np.abs(echoes.amplitude).argmax()
@@ -180,7 +181,7 @@ def test_corners_with_a_door_move_as_it_does():
 
 
 def test_points_move_over_a_door():
-    """A point that stands, seen over a door on one way and on both, through the whole burst."""
+    """A static point, seen over a door on one path and on both, over the whole burst."""
     mover, place = swinging(60.0), np.array([1.2, 1.3, 0.1])
     echoes = finder([], [mover], Scatterers.points(place[None], np.ones(1)))(HERE, AHEAD, MIDDLE)
     points, n = echoes.where(kind=Kind.POINT), len(echoes.points)
@@ -198,7 +199,8 @@ def test_points_move_over_a_door():
 
 
 def test_ghosts_of_a_lamp_move_with_the_door():
-    """The shortest way over the sphere between radar and image; its point wanders, which is of second order."""
+    """Shortest path over the sphere between radar and image; the motion of its specular point is a second-order
+    effect."""
     mover, center, radius = swinging(60.0), np.array([1.2, 1.3, 0.1]), 0.1
     echoes = finder([LAMP], [mover])(HERE, AHEAD, MIDDLE)
     echoes = echoes.where(kind=Kind.POINT)

@@ -55,7 +55,7 @@ def test_ghosts_stand_where_the_image_method_puts_them(corner):
 
 
 def test_no_ghost_where_the_bounce_misses_the_mirror():
-    """A wall that ends before the specular point: the target is seen, its ghost is not."""
+    """A wall that ends before the specular point: the target has an echo, but no ghost."""
     short = dict(WALL, size=[1, 3], position=[-2, 1.5, 0])
     mesh = rectangle(tuple(short["position"]), tuple(short["size"]), tuple(short["facing"]))
     scene = Scene("short", [SceneObject("wall", mesh, MATERIALS["metal"])])
@@ -64,7 +64,8 @@ def test_no_ghost_where_the_bounce_misses_the_mirror():
 
 
 def test_polarisation_of_the_bounce(corner):
-    """Upright fields on an upright wall are TE (a conductor turns the sign), on a conducting floor TM (it does not)."""
+    """A vertical field on a vertical wall is TE (a conductor inverts the sign), on a conducting floor TM (it does
+    not)."""
     wall_ghost = finder_with_one_target(corner, np.array([2.2, 0.4, 0.0]))(HERE, AHEAD).where(
         bounces=1, through=False, moving=False
     )
@@ -77,7 +78,7 @@ def test_polarisation_of_the_bounce(corner):
 
 
 def test_the_hidden_are_not_seen(corner):
-    """Scatterers of the board behind the box give no direct echo; those beside the box do."""
+    """Scatterers of the board behind the box have no direct echo; those beside the box do."""
     scatterers = Surface(corner, np.random.default_rng(0), density=400.0).all()
     echoes = PathFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
     seen = echoes.points[:, 0]
@@ -120,7 +121,7 @@ def test_speckle_is_the_same_world_from_elsewhere(corner):
 
 
 def test_speckle_is_rayleigh():
-    """Kolmogorov-Smirnov."""
+    """Kolmogorov-Smirnov test of amplitudes against a Rayleigh distribution."""
     assert stats.kstest(speckle(60), stats.rayleigh.cdf).pvalue > 0.01
 
 
@@ -138,7 +139,7 @@ def test_power_does_not_depend_on_the_number_of_scatterers(corner):
 
 
 def test_wall_reflection_survives_the_whole_chain(corner):
-    """The metal wall seen face on: lambda / (8 pi R) times the gain at boresight, at its range."""
+    """The metal wall at normal incidence: lambda / (8 pi R) times the gain at boresight, at its range."""
     facing = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # boresight towards +y
     scatterers = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     echoes = PathFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, facing)

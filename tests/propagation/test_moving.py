@@ -26,7 +26,7 @@ WALKER = Person(name="walker", path=((0, 0), (10, 0)), speed=1.2)
 
 
 def test_scatterers_are_carried_along():
-    """A scatterer keeps its distance from every other of the same part."""
+    """A scatterer keeps its distance from all others of the same part."""
     crowd = MovingTargets([WALKER, Fan(name="f", center=(3, 1, 2))], np.random.default_rng(1))
     places = crowd.positions(np.array([0.3, 1.7]))
     for part in (0, 3, 10):
@@ -67,7 +67,8 @@ def alone(movers, scene=None, surface=NOTHING, seed=0):
 
 
 def brute_force(echoes, crowd, time, which, mirror=None):
-    """The beat signal with every scatterer placed anew at every sample of every chirp; `which`: of each echo."""
+    """Beat signal with every scatterer at its exact position for every sample of every chirp; `which`: scatterer of
+    each echo."""
     loops, n_tx, n_rx, samples, _ = CONFIG.frame_shape
     on_ramp = (np.arange(samples) - (samples - 1) / 2) / CONFIG.sample_rate
     tx, rx = tx_positions(CONFIG), rx_positions(CONFIG)
@@ -132,7 +133,7 @@ def test_ghosts_of_movers_move_as_mirrored():
 
 
 def test_an_approaching_person_closes():
-    """Somebody who walks towards the radar has positive closing speed, about their own."""
+    """A person who walks towards the radar has a positive closing speed, about the walking speed."""
     mover = Person(name="p", path=((4.0, 0), (0.5, 0)), speed=1.0, floor=-1.0)
     finder, _ = alone([mover])
     echoes = finder(np.zeros(3), np.eye(3), 1.0)
@@ -143,7 +144,7 @@ def test_an_approaching_person_closes():
 
 
 def test_a_person_casts_a_shadow():
-    """Points behind a standing person fall silent; those beside do not."""
+    """Points behind a standing person have no echo; those beside do."""
     person = Person(name="p", path=((1.5, 0),), floor=-1.0)
     place = np.array([polar(3.0, azimuth) for azimuth in (-20, 0, 20)])
     finder, _ = alone([person], surface=Scatterers.points(place, np.ones(3)))
@@ -153,7 +154,7 @@ def test_a_person_casts_a_shadow():
 
 
 def test_cross_section_of_a_person():
-    """The echoes of a person add up to about the cross section that was asked for."""
+    """The echoes of a person add up to about the specified cross section."""
     person = Person(name="p", path=((3.0, 0),), floor=-1.0, cross_section=0.5)
     finder, _ = alone([person])
     echoes = finder(np.zeros(3), np.eye(3), 0.0)

@@ -56,7 +56,7 @@ AT_END = sheet("end", "metal", (3.0, 0, 0), (2.4, 2.4), (-1, 0, 0))
     ],
 )
 def test_phantom_in_the_heat_map(objects, place, phantom):
-    """Out and back over the same mirror: a phantom at the image, within one range bin and one degree."""
+    """Out and back over the same mirror: a ghost at the image, within one range bin and one degree."""
     echoes = finder(objects, place)(HERE, AHEAD).where(bounces=2, through=False, kind=Kind.POINT)
     seen = [k for k, p in enumerate(echoes.points) if np.allclose(p, phantom)]
     assert len(seen) == 1
@@ -95,7 +95,7 @@ def test_all_phantoms_of_a_corner():
 
 
 def test_the_hidden_are_seen_over_mirrors():
-    """A target behind a metal board gives no direct echo, but one out and back over the wall."""
+    """A target behind a metal board has no direct echo, but one out and back over the wall."""
     board = SceneObject("board", box((1.2, 0, 0), (0.05, 0.6, 2.0)), MATERIALS["metal"])
     place = np.array([2.4, 0.0, 0.0])
     echoes = finder([LEFT, board], place)(HERE, AHEAD)
@@ -108,7 +108,8 @@ def test_the_hidden_are_seen_over_mirrors():
 @pytest.mark.parametrize("tm", [False, True])
 @pytest.mark.parametrize("material", ["glass", "plasterboard"])
 def test_pane_in_front_of_a_target(material, tm, angle):
-    """Loss and phase of a pane, passed twice, against the transfer matrix; turned upright it is TE, tipped over TM."""
+    """Loss and phase of a pane, passed twice, against the transfer matrix; rotated about the vertical it is TE, tilted
+    TM."""
     place, tilt = np.array([3.0, 0, 0]), np.deg2rad(angle)
     facing = (-np.cos(tilt), 0, np.sin(tilt)) if tm else (-np.cos(tilt), np.sin(tilt), 0)
     pane = sheet("pane", material, (1.5, 0, 0), (2.0, 2.0), facing)
@@ -144,8 +145,8 @@ SLABS = {
 @pytest.mark.parametrize("tm", [False, True])
 @pytest.mark.parametrize("name", SLABS)
 def test_slabs_reflect_as_they_transmit(name, tm):
-    """Mirrors and ways through have the coefficients of one slab at any angle: the transfer matrix, and no energy is
-    made. Fringes of 40 mm of wood are 4 deg apart."""
+    """Reflection and transmission coefficients are those of one slab at any angle: transfer matrix and energy
+    conservation. Fringes of 40 mm of wood are 4 deg apart."""
     m, f = replace(SLABS[name], roughness=0.0), CONFIG.center_frequency
     cosine, made_of = np.linspace(0.1, 1, 997), layer(m, CONFIG)
     back = np.array([mirror(made_of, c)[int(tm)] for c in cosine])
@@ -160,7 +161,7 @@ def test_slabs_reflect_as_they_transmit(name, tm):
 
 @pytest.mark.parametrize("name", SLABS)
 def test_delays_are_those_of_unwrapped_phases(name):
-    """Of what a slab lets through, at several angles, and of what it mirrors head on, over the middle of the sweep."""
+    """Delay of transmission at several angles, and of reflection at normal incidence, over the middle of the sweep."""
     m, share = SLABS[name], sweep_share(CONFIG)
     f = CONFIG.center_frequency * (1 + share * np.linspace(-0.5, 0.5, 2001))
     eps = m.permittivity_at(CONFIG.center_frequency)
@@ -179,7 +180,8 @@ def test_delays_are_those_of_unwrapped_phases(name):
 
 @pytest.mark.parametrize("closed", [False, True], ids=["sheet", "closed body"])
 def test_a_pane_reflects_once(closed):
-    """Face on, a pane echoes lambda |r| / (8 pi R) with r of the slab, be it a sheet or a body with two faces."""
+    """At normal incidence a pane echoes lambda |r| / (8 pi R) with r of the slab, as a sheet or as a body with two
+    faces."""
     pane = sheet("pane", "glass", (1.5, 0, 0), (4.0, 4.0), (-1, 0, 0))
     if closed:
         pane = SceneObject("pane", box((1.503, 0, 0), (0.006, 4.0, 4.0)), MATERIALS["glass"])
@@ -197,8 +199,8 @@ def test_a_pane_reflects_once(closed):
 @pytest.mark.parametrize("angle", [0, 35])
 @pytest.mark.parametrize("board", [MATERIALS["plasterboard"], SLABS["block 250"]], ids=["plasterboard", "block"])
 def test_delay_of_a_slab(board, angle):
-    """A slab that hardly reflects, or whose rear face hardly counts, makes the target look (sqrt(eps - sin^2) - cos) d
-    further away: 0.309 m behind 0.25 m of permittivity 5."""
+    """A slab with little reflection, or whose rear face hardly contributes, shifts the apparent target by (sqrt(eps -
+    sin^2) - cos) d: 0.309 m behind 0.25 m of permittivity 5."""
     place, tilt = np.array([3.0, 0, 0]), np.deg2rad(angle)
     pane = sheet("pane", board, (1.5, 0, 0), (2.0, 2.0), (-np.cos(tilt), np.sin(tilt), 0))
     echoes = PathFinder(Scene("pane", [pane]), Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD)
@@ -209,7 +211,7 @@ def test_delay_of_a_slab(board, angle):
 
 
 def test_walls_and_doors():
-    """A stud wall is two boards, a door leaf one slab of its own thickness; concrete lets nothing through."""
+    """A stud wall is two boards, a door leaf one slab of its own thickness; concrete is opaque."""
     place = np.array([3.0, 0, 0])
     f = CONFIG.center_frequency
 
@@ -250,7 +252,8 @@ def test_reciprocity_of_an_office(office, place, yaw):
 
 
 def test_thinning_keeps_the_power_of_ghosts():
-    """Of a sampled surface few scatterers are seen over mirrors, with the power of all: within 0.5 dB over 12 draws."""
+    """Of a sampled surface only some scatterers have paths over mirrors, with the power of all: within 0.5 dB over 12
+    draws."""
     wall = sheet("wall", "brick", (3.0, 0, 0), (1.6, 1.6), (-1, 0, 0))
     scene = Scene("room", [LEFT, wall])
     facets = Reflectors.of(scene, CONFIG)
@@ -296,7 +299,7 @@ def test_an_antenna_of_high_gain_has_its_ghosts():
 
 
 def slab(material, cosine, tm=False):
-    """What a sheet leaves of an amplitude, relative to the air that it takes the place of; as in the beat signal."""
+    """Factor of a sheet on an amplitude, relative to the air in its place; as in the beat signal."""
     m, f = MATERIALS[material], CONFIG.center_frequency
     tau, _ = transfer_matrix([(m.permittivity_at(f), m.thickness)], cosine, f, tm)
     return np.conj(tau * np.exp(2j * np.pi * f / SPEED_OF_LIGHT * m.thickness * cosine))
@@ -305,8 +308,8 @@ def slab(material, cosine, tm=False):
 @pytest.mark.parametrize("angle", [0.0, 25.0])
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_corner_behind_a_pane(moving, angle):
-    """A metal dihedral, wholly behind 6 mm of glass: the image in its edge, lambda / (4 pi 2 R), through the pane there
-    and back; whether the pane stands or is the leaf of a door."""
+    """A metal dihedral behind 6 mm of glass: the image in its edge, lambda / (4 pi 2 R), attenuated by the pane twice;
+    for a static pane and for the leaf of a door."""
     side, turn = 0.6 / np.sqrt(8), np.deg2rad(angle)
     plates = [sheet(f"plate {k}", "metal", (2.5 - side, k * side, 0), (0.6, 0.6), (-1, -k, 0)) for k in (1, -1)]
     along = np.array([np.sin(turn), np.cos(turn), 0.0])

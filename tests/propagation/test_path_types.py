@@ -35,12 +35,12 @@ def found(objects, points=NOTHING, config=CONFIG):
 
 
 def point(*place):
-    """A target of 1 m^2."""
+    """Target with a cross section of 1 m^2."""
     return Scatterers.points(np.array(place), np.ones(1))
 
 
 def wall(distance, side=0.0, size=(6.0, 3.0)):
-    """A metal wall before the radar, or beside it."""
+    """Metal wall in front of the radar, or beside it."""
     if side:
         return rectangle((distance, side, 0), size, (0, -np.sign(side), 0)), "metal"
     return rectangle((distance, 0, 0), size, (-1, 0, 0)), "metal"
@@ -48,7 +48,7 @@ def wall(distance, side=0.0, size=(6.0, 3.0)):
 
 @pytest.mark.parametrize("shear", [0.0, 0.05, 0.5])
 def test_a_corner_that_is_not_quite_square_is_none(shear):
-    """Buildings are out of square by some tenths of a degree; their corners echo from where they stand all the same."""
+    """Corners out of square by some tenths of a degree are no ghosts: their echo is at their position."""
     corner = []
     for bearing, towards in ((135.0, -135.0), (-135.0 + shear, 135.0 + shear)):
         along, facing = (np.array([np.cos(a), np.sin(a), 0]) for a in np.deg2rad([bearing, towards]))
@@ -89,7 +89,7 @@ def test_one_antenna_tells_no_directions_apart():
 
 
 def test_what_stands_before_a_wall_is_no_slab():
-    """A metal pole before a concrete wall keeps some of its reflection out; nothing passes through anything."""
+    """A metal pole in front of a concrete wall blocks part of its reflection; no path passes a slab."""
     pole = placed(cylinder((0, 0, 0), 0.02, 3.0, 24), (2.0, 0.03, 0))
     paths, types = found([(box((3.1, 0, 0), (0.2, 6, 3)), "concrete"), (pole, "metal")])
     assert not paths.through.any()

@@ -43,7 +43,7 @@ scanned = cache(lambda seed, noise: finder(scanned_wall(seed, noise)))
 
 
 def coherent_field(finder, position):
-    """Sum of all specular reflections, edges and corners that can be seen."""
+    """Sum of all visible specular reflections, edges and corners."""
     echoes = finder(position, np.eye(3))
     return field(echoes, position, CONFIG.wavelength)
 
@@ -58,7 +58,7 @@ def test_a_scanned_wall_does_not_sparkle(position):
 
 
 def test_a_scanned_corner_is_two_planes():
-    """Two noisy walls that share an edge stay apart."""
+    """Two noisy walls that share an edge stay separate."""
     wall = scanned_wall(3, 5e-4, size=1.0)
     other = wall.copy()
     other.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1], [2, 0.5, 0]))
@@ -69,14 +69,14 @@ def test_a_scanned_corner_is_two_planes():
 
 
 def test_curved_surfaces_are_no_planes():
-    """A finely tessellated pipe and ball bend too much: none of their facets grows beyond itself."""
+    """Facets of a finely tessellated pipe and sphere are not joined: the surface bends too much."""
     for mesh, side in ((shapes.cylinder((0, 0, 0), 0.05, 1, 60), 2), (shapes.sphere((0, 0, 0), 0.1), 1)):
         on_side = [r for r in planes.regions(mesh) if abs(mesh.face_normals[r[0]] @ [0, 0, 1]) < 0.999]
         assert max(len(r) for r in on_side) <= side
 
 
 def tiled(quads, region):
-    """Quadrilaterals that do not overlap and together are a region."""
+    """Whether quadrilaterals do not overlap and together cover a region."""
     shapes_ = [shapely.Polygon(q) for q in quads]
     assert sum(s.area for s in shapes_) == pytest.approx(region.area)
     assert shapely.union_all(shapes_).symmetric_difference(region).area < 1e-5

@@ -50,7 +50,8 @@ def power(frames):
 
 @pytest.mark.parametrize("name", ["office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"])
 def test_ghosts_that_are_found(name, monkeypatch):
-    """At least 99 % of the power of ghosts, in one frame; over four of each scene it is 99.4 to 100 %."""
+    """At least 99 % of the power of ghosts is found in one frame; over four frames of each scene it is 99.4 to 100
+    %."""
     scene = Scene.load(name)
     scenario = Scenario(scene, Walk("handheld", 30).through(scene, 1), CONFIG, seed=1)
     times = np.array([19.0])
@@ -62,7 +63,7 @@ def test_ghosts_that_are_found(name, monkeypatch):
 
 
 def rooms():
-    """A room whose end is a glass partition and a closed door of wood, and behind these a furnished one of concrete."""
+    """A room whose end is a glass partition and a closed wooden door, in front of a furnished concrete room."""
     sheets = [
         ("floor", "concrete", (3, 0, 0), (8, 5), (0, 0, 1)),
         ("ceiling", "concrete", (3, 0, 2.6), (8, 5), (0, 0, -1)),
@@ -84,7 +85,7 @@ def rooms():
 
 @pytest.mark.parametrize("yaw", [-0.3, 0.3])
 def test_ghosts_behind_glass_and_doors(yaw, monkeypatch):
-    """The same of those that pass a pane or a door on their way."""
+    """The same for ghosts whose path passes a pane or a door."""
     scene = rooms()
     surface = Surface(scene, np.random.default_rng(0), 60.0)
     finder = PathFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 7.5e-9)

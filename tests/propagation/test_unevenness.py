@@ -55,7 +55,7 @@ def kirchhoff(field, place):
 
 @pytest.mark.parametrize("distance", [0.6, 1.5, 3.0])
 def test_the_reflection_is_kirchhoffs_integral(distance):
-    """At several places before a wall, within the paraxial terms that the sum leaves out."""
+    """At several places in front of a wall, up to the neglected terms beyond the paraxial ones."""
     field = heights()
     for y in (-0.8, 0.13, 1.1):
         place = np.array([[distance, y, 0.3]])
@@ -71,7 +71,7 @@ def test_a_flat_wall_keeps_its_reflection():
 
 @pytest.fixture(scope="module")
 def seen():
-    """F of a quarter of the usual unevenness along walls of many seeds, at places 0, 1, 2, 4, 8 and 1000 cm on."""
+    """F for a quarter of the usual unevenness along walls of many seeds, at offsets of 0, 1, 2, 4, 8 and 1000 cm."""
     steps = np.array([0.0, 0.01, 0.02, 0.04, 0.08, 10.0])
     place = np.stack([np.full_like(steps, 2.0), steps, np.full_like(steps, 0.3)], axis=1)
     walls = [heights(0.25, seed) for seed in range(400)]
@@ -87,7 +87,7 @@ def test_mean_and_power_of_the_reflection(seen):
 
 
 def test_correlation_along_the_wall(seen):
-    """That of the screen: free space is an all-pass filter."""
+    """The correlation of F is that of the screen: free space is an all-pass filter."""
     steps, factors = seen
     found = np.mean(factors * factors[:, :1].conj(), axis=0)
     lost = sum((0.25 * rms) ** 2 * (1 - np.exp(-((steps / length) ** 2))) for rms, length in SCALES)
@@ -95,7 +95,7 @@ def test_correlation_along_the_wall(seen):
 
 
 def test_heights_are_as_rough_as_they_say():
-    """RMS, and how far the middle is from a straightedge of a metre: within what plasterers are allowed, 5 mm."""
+    """RMS, and deviation from a straightedge of a metre: within the tolerance of plasterers, 5 mm."""
     y = np.arange(0, 400, 0.5)
     middle = np.array([heights(seed=s)(np.stack([0 * y, y, 0 * y], axis=1)) for s in range(20)])
     variance = sum(rms**2 for rms, _ in SCALES)
@@ -125,7 +125,7 @@ def test_finder_takes_the_factor_of_plaster_and_none_of_glass():
 
 
 def test_nothing_jumps_where_the_foot_leaves_the_wall():
-    """Along 4 cm across the wall's edge, in steps that turn no phase by much, the field goes on smoothly."""
+    """Over 4 cm across the wall's edge, in steps of small phase change, the field is continuous."""
     at = np.arange(2.98, 3.02, 1e-3)
     places = np.stack([np.full_like(at, 2.0), at, np.full_like(at, 0.1)], axis=1)
     found, field = finder(wall(1.0)), []

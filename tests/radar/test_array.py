@@ -84,7 +84,7 @@ def test_channels_of_the_low_power_board_are_reversed_by_turns():
 
 
 def test_rows_less_than_a_wavelength_apart_tell_elevation():
-    """The AWR2944's are 0.8 wavelengths apart; of the AOP's column every second row would be one apart."""
+    """The AWR2944's rows are 0.8 wavelengths apart; every second row of the AOP's column would be one apart."""
     config = radar("awr2944evm")
     pairs, grid = elevation_pairs(config), _grid("awr2944evm")
     assert grid[pairs[:, 1]] - grid[pairs[:, 0]] == pytest.approx(np.tile([0, 1.6], (4, 1)))

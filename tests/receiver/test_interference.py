@@ -46,7 +46,7 @@ GHOST = {"start": 8e-9}  # its chirps begin as ours do, but for a beat within th
     ("distance", "bearing", "gains"), [(1, 0, BOTH), (4, 0, BOTH), (4, 28, BOTH - 3), (2, -50, BOTH - 6)]
 )
 def test_power_is_friis(distance, bearing, gains):
-    """P G G' (lambda / 4 pi d)^2 with both patterns, over the transmitted power; and no more of what backs off."""
+    """P G G' (lambda / 4 pi d)^2 with both patterns, relative to the transmitted power, and reduced by the back-off."""
     board = FrontEndConfig.ideal(band=Band(), antenna=FrontEndConfig.of(CONFIG.board).antenna)
     for backoff in (0, 6):
         radar = {"loops": 8, "tx_backoff_db": backoff}
@@ -62,7 +62,7 @@ def test_boards_that_look_away_do_not_hear():
 
 @pytest.mark.parametrize("difference", [0.5e12, 2e12, 10e12, -30e12])
 def test_energy_of_a_crossing(difference):
-    """A chirp spends |H|^2 df / |S - S'| at each frequency, however short that is beside a sample."""
+    """A chirp has the energy |H|^2 df / |S - S'| at each frequency, even if it is shorter than a sample."""
     slope = CONFIG.slope - difference
     early = 25e-6 * difference / slope  # so that they cross in the middle of the window
     board = FrontEndConfig.ideal(band=Band(low=-0.03, high=0.96))  # nothing folds
@@ -84,7 +84,7 @@ def test_duration_of_a_crossing():
 
 # --- place -----------------------------------------------------------------------------------------------------------
 def ghost_range(found: np.ndarray) -> float:
-    """Of the strongest tone, m."""
+    """Range of the strongest tone, m."""
     window = np.hanning(CONFIG.samples)
     return np.abs(np.fft.fft(found * window, 64 * CONFIG.samples)).argmax() / 64 * CONFIG.range_resolution
 
@@ -107,8 +107,8 @@ def test_like_chirps_make_a_ghost():
     [(GHOST, CONFIG.adc_center_time), ({"start": -0.4e-6, "radar": {"slope": 78e12, "loops": 8}}, 16e-6)],
 )
 def test_direction_is_the_others_bearing(bearing, fields, crossing):
-    """Over the receivers its phase turns as that of an echo from there, of the frequency at which it crosses: left is
-    left."""
+    """Its phase over the receivers is that of an echo from the interferer's direction at the crossing frequency: left
+    is left."""
     found = signal(facing(6, bearing, **fields))
     turn = np.angle(np.vdot(found[..., :-1, :], found[..., 1:, :])) / (2 * np.pi)
     wavelength = SPEED_OF_LIGHT / (CONFIG.start_frequency + CONFIG.slope * crossing)
@@ -131,7 +131,7 @@ def wall(material: str) -> dict:
 
 
 def test_walls_stand_in_the_way():
-    """Metal stops it, glass lets some through, and somebody who walks by stops it for a while."""
+    """Metal blocks it, glass transmits part of it, and a person who walks by blocks it for a while."""
     other = facing(4, **GHOST)
     free = np.abs(signal(other)).max()
     assert not signal(other, objects=[wall("metal")]).any()
@@ -172,7 +172,7 @@ def test_frames_are_functions_of_their_instants():
 
 
 def test_who_sends_elsewhere_changes_nothing():
-    """In another band, or not yet: the samples are those without."""
+    """An interferer in another band, or one that has not started, does not change the samples."""
     plain = walk()
     expected = plain.frames(plain.times[:2]).samples
     for other in ({"radar": {"start_frequency": 60e9, "board": "iwr6843isk"}}, {"start": 0.5}):

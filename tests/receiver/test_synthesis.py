@@ -39,14 +39,14 @@ def test_against_brute_force():
 
 
 def test_against_direct_sum():
-    """The same path-length parabolas summed directly: what the expansion itself leaves out."""
+    """Against a direct sum over the same path-length parabolas: error of the expansion."""
     echoes = cloud(np.random.default_rng(2), 300)
     lengths = echoes.lengths(CONFIG, FAST, 0.0)
     assert error_db(Synthesizer(CONFIG)(lengths, echoes.amplitude), direct_sum(CONFIG, lengths, echoes.amplitude)) < -60
 
 
 def test_the_direct_sum_itself():
-    """What parabolas leave out."""
+    """Error of the path-length parabolas."""
     echoes = cloud(np.random.default_rng(2), 25)
     truth = beat(CONFIG, FAST, 0.2, echoes.points, echoes.amplitude)
     assert error_db(direct_sum(CONFIG, echoes.lengths(CONFIG, FAST, 0.2), echoes.amplitude), truth) < -55

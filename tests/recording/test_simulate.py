@@ -1,4 +1,4 @@
-"""Whole recordings from the simulator: readable, and true to their own truth."""
+"""Whole simulated recordings: readable, and consistent with their ground truth."""
 
 from multiprocessing import active_children
 from pathlib import Path
@@ -94,7 +94,7 @@ def test_iq_by_cause_adds_up(tmp_path):
 
 @pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
 def test_large_scenes_can_be_walked(name, size):
-    """The benchmark's buildings have their size, but for corners out of square, and a tour through them."""
+    """The benchmark's buildings have their size, up to corners out of square, and a tour through them."""
     scene = Scene.load(name)
     assert np.ptp(scene.bounds, axis=0)[:2] == pytest.approx(size, rel=0.005)
     assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0

@@ -62,7 +62,7 @@ def test_the_label_is_the_strongest_cause(seen):
 
 
 def test_cells_below_the_noise_are_noise(seen):
-    """The level it takes for noise is that of a map of noise alone."""
+    """The noise threshold is the level of a map of noise only."""
     sensor, rows, reference = seen
     rng = np.random.default_rng(0)
     empty = sensor.scenario.board.receive(np.zeros(CONFIG.frame_shape[:-1], np.complex64), rng)

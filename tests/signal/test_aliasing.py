@@ -15,7 +15,7 @@ SPAN = 2 * CONFIG.max_velocity
 
 
 def frame(velocity, config=CONFIG, noise=5.0):
-    """Points ahead, from a radar that moves evenly."""
+    """Points ahead of a radar in uniform motion."""
     azimuths, ranges = np.radians(np.linspace(-55, 55, 60)), np.random.default_rng(4).uniform(0.8, 4.0, 60)
     points = np.stack([ranges * np.cos(azimuths), ranges * np.sin(azimuths), np.zeros(60)], axis=1)
 

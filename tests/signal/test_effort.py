@@ -27,7 +27,7 @@ ALLOWED = [
 
 @pytest.mark.parametrize("config", ALLOWED, ids=lambda c: f"{c.samples}-{c.loops}-{c.frame_period}")
 def test_rotation_looks_at_so_many_cells_and_no_more(config):
-    """Cells are what all its steps take time for."""
+    """The number of cells determines the time of all its steps."""
     check_limits(config)
     rotation, rng = MapRotation(Heatmaps(config)), np.random.default_rng(0)
     shape = (1, config.samples, config.loops, len(config.slot) * len(config.rx))
@@ -42,7 +42,7 @@ def test_rotation_looks_at_so_many_cells_and_no_more(config):
 
 
 def test_the_strongest_of_neighbouring_speeds_are_what_is_left():
-    """By brute force; and a frame of as few speeds as the preset's is left as it is."""
+    """Against brute force; a frame with as few speeds as the preset's is unchanged."""
     rng = np.random.default_rng(0)
     cells = (rng.normal(size=(2, 3, 200, 6)) + 1j * rng.normal(size=(2, 3, 200, 6))).astype(np.complex64)
     left = _essence(torch.as_tensor(cells)).numpy()

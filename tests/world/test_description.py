@@ -1,4 +1,4 @@
-"""Scene files: what they mean, and one clear sentence for each mistake."""
+"""Scene files: their meaning, and error messages of one sentence."""
 
 import numpy as np
 import pytest
@@ -187,7 +187,7 @@ def test_mistakes_in_levels(tmp_path, level, text, message):
     ],
 )
 def test_clutter_and_unevenness(tmp_path, text, settings):
-    """1 by default of what has a building, 0 of objects alone; what is given counts, 0 too, at every level."""
+    """Default 1 with a building, 0 with objects only; given values apply at every level, 0 too."""
     assert load(tmp_path, text).surface_settings == settings
     if "levels" in text:
         assert Scene.load(f"{tmp_path / 'scene.yaml'}@1").surface_settings == settings

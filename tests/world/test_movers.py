@@ -1,4 +1,4 @@
-"""Movers: kinematics, their surfaces, and what they hide."""
+"""Moving objects: kinematics, surfaces, and occlusion."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_legs_alternate():
 
 
 def test_motion_is_smooth():
-    """No part ever jumps: speeds stay below 6 m/s, accelerations finite, corners and about-turns included."""
+    """Speeds stay below 6 m/s and accelerations finite, corners and turn-arounds included."""
     round_trip = Person(name="p", path=((0, 0), (2, 0), (2, 2)), speed=1.0)
     t = np.arange(0, 12, 1e-3)
     _, center = round_trip.poses(t)

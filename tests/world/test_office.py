@@ -1,4 +1,4 @@
-"""The office: reproducible, walkable, and clean geometry."""
+"""The office: reproducible, accessible, and with clean geometry."""
 
 import zlib
 
@@ -82,7 +82,7 @@ def test_is_an_office(office):
 
 @pytest.mark.parametrize("building", [Office(seed=0), Office(seed=7), Building(kind="A"), Building(kind="C")])
 def test_no_face_lies_on_another(building):
-    """From just outside any face one looks into the open, not into a coplanar copy: its own surface is the nearest."""
+    """The nearest surface just outside any face is that face itself, not a coplanar copy."""
     scene = Scene("x", building.build())
     rng = np.random.default_rng(0)
     weight = rng.dirichlet(np.ones(3), len(scene.triangles))

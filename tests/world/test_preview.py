@@ -1,4 +1,4 @@
-"""The pictures show what is there."""
+"""Contents of the preview pictures."""
 
 import numpy as np
 import pytest

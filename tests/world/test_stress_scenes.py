@@ -1,4 +1,4 @@
-"""The places of the multipath stress test do what they are there for, more at every level."""
+"""Places of the multipath stress test have their effect, and more of it at every level."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ TASKS = Specification.load("stress").tasks
 
 
 def caused_by(*causes: PathType) -> Callable[[dict[str, np.ndarray], np.ndarray], float]:
-    """Share of the cells above the noise that these causes fill."""
+    """Fraction of the cells above the noise with these path types."""
 
     def share(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
         cause = seen["truth/cause"]
@@ -32,7 +32,7 @@ def caused_by(*causes: PathType) -> Callable[[dict[str, np.ndarray], np.ndarray]
 
 
 def before_the_surface(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
-    """Share of the cells in front of the first surface in which something is 20 dB above the noise."""
+    """Fraction of the cells in front of the first surface that are 20 dB above the noise."""
     power = 10 ** (seen["truth/cause_power"].astype(float) / 10)
     noise = power.min() * 10 ** (DEPTH / 10)  # kept no lower than so far below it
     ranges = CONFIG.ranges[:, None]

@@ -156,7 +156,7 @@ def test_robot_laser_messages(tmp_path):
 
 @pytest.mark.skipif(not RADISH.is_dir(), reason="needs ../shared/recordings/radish")
 def test_the_intel_lab(tmp_path):
-    """Part of a real building: what its lidar saw lies on few straight walls, and one can walk there."""
+    """Part of a real building: its lidar points lie on few straight walls, and its rooms are accessible."""
     log = gzip.decompress((RADISH / "intel-corrected.log.gz").read_bytes()).decode()
     lines = [line for line in log.splitlines() if line.startswith("FLASER")][:260]
     (tmp_path / "intel.log").write_text("\n".join(lines))

@@ -28,14 +28,14 @@ def inside_out(mesh):
 
 
 def brought(tmp_path, *meshes, **options):
-    """Meshes imported from one PLY file."""
+    """Import meshes from one PLY file."""
     shapes.joined(*meshes).export(tmp_path / "place.ply")
     return import_scene(tmp_path / "place.ply", tmp_path / "out", Options(**options))
 
 
 @pytest.mark.parametrize("inwards", [False, True])
 def test_a_closed_box_is_a_room(tmp_path, inwards):
-    """One can walk in it, and its wall echoes as an endless plane of concrete does."""
+    """It is accessible, and its wall echoes like an infinite plane of concrete."""
     done = brought(tmp_path, inside_out(ROOM) if inwards else ROOM)
     assert [row.material for row in done.rows] == ["concrete"]
     assert any("treated as a room" in remark for remark in done.remarks) != inwards
@@ -75,7 +75,7 @@ def test_solids_stay_solid(tmp_path):
 
 
 def lying(mesh, up):
-    """A mesh with z up as a file with another axis up has it."""
+    """Mesh with z up converted to a file's other up axis."""
     return mesh if up == "z" else trimesh.Trimesh(mesh.vertices[:, [0, 2, 1]] * [1, 1, -1], mesh.faces, process=False)
 
 
@@ -110,7 +110,7 @@ def test_where_the_mesh_says_nothing_the_format_does(tmp_path):
 
 
 def test_a_scene_without_echoes_is_refused(tmp_path, capsys):
-    """A block of concrete from within, in one sentence."""
+    """A radar inside a block of concrete gives an error message."""
     ROOM.export(tmp_path / "block.ply")
     (tmp_path / "block.yaml").write_text("objects: [{name: block, shape: mesh, file: block.ply, material: concrete}]\n")
     line = ["simulate", str(tmp_path / "block.yaml"), "-o", str(tmp_path / "a.h5"), "--duration", "1"]
@@ -132,7 +132,7 @@ def walls_of_a_room():
 
 @pytest.mark.parametrize("table", [False, True])
 def test_a_room_without_a_floor_gets_one(tmp_path, table):
-    """It stays where it is, and one walks in it, not on its roof."""
+    """It stays at its position, and a walk is inside it, not on its roof."""
     meshes = [walls_of_a_room(), shapes.box((3, 2, 2.65), (6.2, 4.2, 0.1))]
     done = brought(tmp_path, *meshes, *([shapes.box((1, 1, 0.75), (1.2, 0.6, 0.05))] if table else []))
     assert not any("moved by" in remark for remark in done.remarks)

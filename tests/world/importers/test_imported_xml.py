@@ -27,7 +27,7 @@ def shipped(name: str) -> Path:
     ],
 )
 def test_sionna_scenes(tmp_path, name, materials):
-    """Same extent, shapes and materials as Sionna RT itself loads."""
+    """Same extent, shapes and materials as loaded by Sionna RT."""
     import sionna.rt
 
     done = import_scene(shipped(name), tmp_path, Options(floor=False))

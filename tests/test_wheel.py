@@ -1,4 +1,4 @@
-"""What is installed elsewhere: built as a publisher builds it, used outside of the repository."""
+"""Installed package: built like a published one, used outside of the repository."""
 
 import os
 import shutil

@@ -104,7 +104,7 @@ class Running:
 
     @property
     def options(self) -> list[str]:
-        """Of `radarize capture` and `live`, to find it."""
+        """Options of `radarize capture` and `live` for the virtual radar."""
         found = {
             "--port": self.port, "--host": COMPUTER, "--dca": BOARD,
             "--command-port": self.command_port, "--data-port": self.data_port,

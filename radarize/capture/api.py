@@ -96,7 +96,7 @@ class LiveFrame:
 
     @property
     def numbers(self) -> range:
-        """The number alone."""
+        """Range with the number of the frame only."""
         return range(self.number, self.number + 1)
 
     @property

@@ -27,7 +27,7 @@ class Unwatched:
     watched = False
 
     def send(self, name: str, content: dict[str, object]) -> None:
-        """Nothing."""
+        """Discard the content."""
 
 
 class LivePage:

@@ -166,12 +166,12 @@ class FrameStream:
 
     @property
     def counts(self) -> StreamCounts:
-        """Frames so far."""
+        """Counts of frames so far."""
         return _read(StreamCounts, self._counts[: len(fields(StreamCounts))])
 
     @property
     def packets(self) -> PacketCounts:
-        """Packets so far."""
+        """Counts of packets so far."""
         return _read(PacketCounts, self._counts[len(fields(StreamCounts)) :])
 
 

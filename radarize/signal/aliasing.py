@@ -18,8 +18,8 @@ from radarize.radar.config import RadarConfig
 
 #: Smallest power of the cells used, relative to the median cell's, and smallest range, beyond the leakage, m.
 _THRESHOLD, _LEAKAGE = 20.0, 0.25
-#: Smallest likelihood ratio of another window to that about zero, in standard deviations for cells of random phase, and
-#: smallest fraction of the cells that must agree with it.
+#: Smallest excess of another window's likelihood over that of the window about zero, in standard deviations for cells
+#: of random phase, and smallest fraction of the cells that must agree with it.
 _SIGMAS, _AGREE = 4.0, 0.5
 #: Largest number of windows tried; and m/s, the largest speed of a person who walks, up to which they extend.
 _MOST, _FASTEST = 129, 3.0

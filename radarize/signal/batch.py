@@ -104,7 +104,7 @@ class Batch:
 
     @cached_property
     def aliases(self) -> Int[np.ndarray, "frame doppler"]:
-        """See `Aliases.of`."""
+        """Number of unambiguous spans to add to the speed of each Doppler bin, see `Aliases.of`."""
         with stage("spectra"):
             return self.signal.aliases.of(self.folded)
 

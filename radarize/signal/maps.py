@@ -80,7 +80,7 @@ class Maker(ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all maps."""
+        """Names of all maps."""
         return tuple(self.maps)
 
     @staticmethod

@@ -37,7 +37,7 @@ class Receivers:
     def _fill(
         self, cells: Complex64[torch.Tensor, "range doppler tx rx"], broken: np.ndarray, whole: np.ndarray
     ) -> None:
-        """In place."""
+        """Interpolate broken receivers in place."""
         step = sum(
             (cells[..., b] * cells[..., a].conj()).sum(dim=-1, keepdim=True)
             for a in whole

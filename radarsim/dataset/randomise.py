@@ -97,7 +97,7 @@ class Distribution:
 
     @property
     def given(self) -> float | dict[str, list[float]]:
-        """Its YAML value."""
+        """YAML value of the distribution."""
         return self.numbers[0] if self.kind == "constant" else {self.kind: [*self.numbers]}
 
     def quantile(self, share: float) -> float:

@@ -59,7 +59,7 @@ class Feed:
         return self._frames.qsize()
 
     def close(self) -> None:
-        """End the process."""
+        """End the process that makes frames."""
         self._closed.set()
         self._process.terminate()
         self._process.join()

@@ -47,7 +47,7 @@ class Playback:
     loop: bool = False
 
     def expected(self) -> RadarConfig:
-        """The recording's own."""
+        """Configuration of the recording."""
         with Recording(self.path) as recording:
             if not len(recording):
                 raise InputError(f"{self.path}: holds no frame, expected at least one to play")

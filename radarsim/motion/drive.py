@@ -158,7 +158,7 @@ def _follow(target: Float[np.ndarray, "step"], rate: float) -> Float[np.ndarray,
 
 
 def _wrapped(angle: float) -> float:
-    """To -pi...pi."""
+    """Wrap an angle to -pi...pi."""
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 

@@ -81,7 +81,7 @@ class Statistics:
         return json.dumps(asdict(self))
 
     def __str__(self) -> str:
-        """One line."""
+        """Summary in one line."""
         line = (
             f"{self.distance:.1f} m in {self.duration:.1f} s, mean {self.mean_speed:.2f} and at most "
             f"{self.top_speed:.2f} m/s, turning at {np.rad2deg(self.rms_turn_rate):.0f} deg/s (RMS, at most "

@@ -81,7 +81,7 @@ class Motion:
         return self.path(inside) + turned(self.attitude(inside), self.lever_arm)
 
     def rotation(self, t: Float[np.ndarray, "n"]) -> Rotation:
-        """Sensor-to-world rotation."""
+        """Sensor-to-world rotation at times t, s."""
         return self.attitude(self._inside(t)) * self.mount
 
     def velocity(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 
 def after(second: Float[np.ndarray, "*n 3 4"], first: Float[np.ndarray, "*m 3 4"]) -> Float[np.ndarray, "*k 3 4"]:
-    """One after another."""
+    """Compose two isometries: `first`, followed by `second`."""
     out = second[..., :3] @ first
     out[..., 3] += second[..., 3]
     return out

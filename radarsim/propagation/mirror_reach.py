@@ -43,8 +43,8 @@ class Trials(NamedTuple):
 
 
 class Chains(NamedTuple):
-    """Mirrors, frame, and the range of aims of each chain; bit mask of those within reach: `lit` from an index on, in
-    groups of eight."""
+    """Mirrors, frame, and the range of aims of each chain; those within reach are marked in `lit` from an index on, padded
+    to groups of eight."""
 
     mirrors: Int[np.ndarray, "chain 2"]
     frame: Int[np.ndarray, "chain"]
@@ -131,7 +131,7 @@ def _reaches(observation, flat, chains, aims, count):
 
 @njit(cache=True)
 def lit_ones(lit):
-    """Which are."""
+    """Indices of the true elements of a mask of aims."""
     found, n = np.empty(len(lit), np.int64), 0
     for eight, some in enumerate(lit.view(np.uint64)):
         if some != 0:  # few are

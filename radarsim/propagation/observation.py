@@ -29,5 +29,5 @@ class Observation(NamedTuple):
 
     @property
     def frames(self) -> int:
-        """How many."""
+        """Number of frames."""
         return len(self.position)

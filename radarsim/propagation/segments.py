@@ -57,7 +57,7 @@ class Segments(NamedTuple):
 
 @njit
 def empty_segments(count):
-    """Segments for `fill`."""
+    """Allocate segments for `fill`."""
     return Segments(
         np.empty(count, np.int64), np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2)),
         np.empty((count, 3)), np.empty((count, 4)), np.empty(count),

@@ -38,7 +38,7 @@ class Mirrors(NamedTuple):
 
     @classmethod
     def none(cls) -> "Mirrors":
-        """No mirror."""
+        """Empty set of mirrors."""
         return cls(np.zeros(0, int), np.zeros((0, 2), int))
 
 

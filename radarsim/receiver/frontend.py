@@ -163,7 +163,7 @@ class FrontEnd:
     def receive(
         self, signal: Complex[np.ndarray, "loop tx rx sample"], rng: np.random.Generator
     ) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """What arrives at the converter, in counts; arguments as for `digitize`."""
+        """Signal at the input of the converter, in counts; arguments as for `digitize`."""
         echoes = self._amplify(signal)
         extra = self._thermal(echoes.shape, rng)
         if self._sidebands or self.settings.image_rejection_db is not None:

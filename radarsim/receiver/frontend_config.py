@@ -32,7 +32,7 @@ class Channel(_Strict):
 
     @property
     def factor(self) -> complex:
-        """Complex amplitude."""
+        """Complex amplitude of the channel."""
         return 10 ** (self.gain_db / 20) * np.exp(1j * np.deg2rad(self.phase_deg))
 
     @classmethod

@@ -48,7 +48,7 @@ class Sweeps(NamedTuple):
     end: Float[np.ndarray, "*n"]
 
     def mirrored(self) -> "Sweeps":
-        """Their complex conjugates."""
+        """Complex conjugates of the sweeps."""
         return self._replace(phase=-self.phase)
 
     def entering(self, low: float, high: float) -> Bool[np.ndarray, "*n"]:
@@ -60,7 +60,7 @@ class Sweeps(NamedTuple):
         return lasting & (np.minimum(first, last) < high + near) & (np.maximum(first, last) > low - near)
 
     def at(self, rows: Bool[np.ndarray, "*n"]) -> "Sweeps":
-        """Some of them."""
+        """Select some sweeps."""
         return Sweeps(self.phase[rows], self.begin[rows], self.end[rows])
 
     def spectrum(self, f: Float[np.ndarray, "bin"]) -> Complex[np.ndarray, "n bin"]:

@@ -56,7 +56,7 @@ class Batches:
 
     @cached_property
     def suite(self) -> Suite:
-        """The sensors."""
+        """Sensors of the recording."""
         return Suite(self.scenario)
 
     def frames(self, first: int, last: int) -> Frames:

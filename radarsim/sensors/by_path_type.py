@@ -22,7 +22,7 @@ class PathTypeCounts(Sensor):
     }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Counts and powers."""
+        """Number and power of echoes by path type, per frame."""
         count = [np.bincount(types, minlength=len(PathType)) for types in frames.types]
         each = zip(frames.types, frames.paths, strict=True)
         power = [np.bincount(types, np.abs(p.amplitude) ** 2, minlength=len(PathType)) for types, p in each]
@@ -40,7 +40,7 @@ class AdcByPathType(Sensor):
         self.streams = {"truth/adc_by_cause": Stream(shape, "f4", "ADC counts", about)}
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The parts."""
+        """I/Q of each part, per frame."""
         others = [frames.interference] if self.scenario.scene.interferers else []
         found = []
         for lengths, amplitudes, types, *signals in zip(

@@ -141,7 +141,7 @@ class DepthCamera(Sensor):
         return (distance / self._stretch).reshape(len(times), self._camera.height, self._camera.width)
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The pictures."""
+        """Depth pictures of frames."""
         depth = self.depth(frames.middles)
         if self._stereo is None:
             return {"truth/depth": np.where(depth < 65.5, np.rint(1000 * depth), 0).astype(np.uint16)}

@@ -63,7 +63,7 @@ class Ghosts(Sensor):
         self.products = axes("truth/cause", config, "range bins")
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Maps and labels."""
+        """Power maps and labels of frames."""
         power, cause = [], []
         for lengths, amplitudes, types in zip(frames.lengths, frames.received, frames.types, strict=True):
             maps = self._maps(lengths, self.scenario.board.scale * amplitudes, types)

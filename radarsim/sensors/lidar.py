@@ -25,7 +25,7 @@ class Lidar(Sensor):
         self._reach = polar.SLAB / slope  # of each beam before it leaves the slab, m
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The pictures."""
+        """Lidar images of frames."""
         motion, times = self.scenario.motion, frames.middles
         each = zip(times, motion.position(times), headings(motion, times), strict=True)
         return {"truth/lidar": np.stack([self._picture(*one) for one in each])}

@@ -70,7 +70,7 @@ class PlanarScan(Sensor):
         }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The scan."""
+        """Scans of frames."""
         times = frames.middles
         distance = self.scenario.rays.distance(*level_rays(self.scenario.motion, times, AZIMUTHS), times)
         return {"truth/scan": np.where(distance <= self.scenario.config.max_range, distance, np.inf)}
@@ -91,7 +91,7 @@ class Occupancy(Sensor):
         self.products = axes("truth/occupancy", scenario.config, "middles of the range cells")
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The label."""
+        """Occupancy labels of frames."""
         times = frames.middles
         rays = level_rays(self.scenario.motion, times, RAYS.ravel())
         distance = self.scenario.rays.distance(*rays, times).reshape(len(times), *RAYS.shape)

@@ -6,14 +6,7 @@ from numba import njit
 
 @njit
 def crossing(origin, way, turn, center, half, capsule):
-    """Where a ray enters a part and where it leaves it, m along the ray; inf and -inf if it misses.
-
-    Args:
-        origin, way: m, and unit direction, world.
-        turn, center: pose of the part: rotation to world, m.
-        half: half extents of a box, m; of a capsule about its z axis: radius, radius, half length (`movers.Part`).
-        capsule: whether it is a capsule.
-    """
+    """Distances along a ray at which it enters and leaves a part, m; inf and -inf if it misses."""
     towards = center - origin
     along = np.dot(towards, way)
     reach = half[2] + half[0] if capsule else np.sqrt(np.dot(half, half))

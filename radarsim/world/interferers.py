@@ -61,5 +61,5 @@ class Interferer(Strict):
 
     @property
     def rotation(self) -> Float[np.ndarray, "3 3"]:
-        """Board to world."""
+        """Board-to-world rotation."""
         return Rotation.from_euler("z", self.yaw, degrees=True).as_matrix()

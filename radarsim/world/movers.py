@@ -50,7 +50,7 @@ class Part:
 
     @property
     def area(self) -> float:
-        """Surface, m^2."""
+        """Surface area, m^2."""
         x, y, z = self.half
         return 4 * np.pi * x * (x + z) if self.capsule else 8 * (x * y + y * z + z * x)
 
@@ -85,7 +85,7 @@ class Mover(Strict, ABC):
 
     @abstractmethod
     def parts(self) -> list[Part]:
-        """The rigid parts."""
+        """Rigid parts of the mover."""
 
     @abstractmethod
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
@@ -202,7 +202,7 @@ class Door(Mover):
         return name
 
     def parts(self) -> list[Part]:
-        """The leaf."""
+        """The door leaf as a rigid part."""
         return [Part((self.width / 2, self.thickness / 2, self.height / 2), False, material(self.material))]
 
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
@@ -233,7 +233,7 @@ class Fan(Mover):
         return self
 
     def parts(self) -> list[Part]:
-        """The blades."""
+        """The blades as rigid parts."""
         return [Part((0.45 * self.radius, 0.08 * self.radius, 0.004), False)] * self.blades
 
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:

@@ -73,7 +73,7 @@ class _Triangles(NamedTuple):
         return cls(mesh.triangles, mesh.face_normals, mesh.area_faces, mesh.triangles_center, np.asarray(mesh.faces))
 
     def take(self, index: Int[np.ndarray, "*region face"]) -> "_Triangles":
-        """Some of them."""
+        """Select some triangles."""
         return _Triangles(*(column[index] for column in self))
 
 

@@ -97,7 +97,7 @@ def cylinder(
 
 
 def sphere(center: Vector, radius: float, subdivisions: int = 3) -> trimesh.Trimesh:
-    """Icosphere."""
+    """Icosphere of a radius, m."""
     result = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     result.apply_translation(center)
     return result

@@ -1,4 +1,4 @@
-"""Which echoes a scene has: ghosts where the image method puts them, reciprocity, visibility, coherent speckle."""
+"""Echoes of a scene: ghosts where the image method puts them, reciprocity, visibility, coherent speckle."""
 
 import numpy as np
 import pytest

@@ -43,7 +43,7 @@ class Border:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Length along the wall, m."""
         return self.high - self.low
 
 

@@ -50,7 +50,7 @@ class Opening:
 
     @property
     def span(self) -> Span:
-        """As a box."""
+        """Box of the opening."""
         x0, y0, x1, y1 = strip(self.room, self.side, self.low, self.high, 0.0, self.thickness)
         return x0, y0, self.bottom, x1, y1, self.top
 

@@ -38,7 +38,7 @@ class Room:
 
     @property
     def center(self) -> tuple[float, float]:
-        """m."""
+        """Centre of the room, m."""
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
     @property

@@ -79,7 +79,7 @@ class Spots:
 
     @classmethod
     def joined(cls, parts: Sequence["Spots"]) -> "Spots":
-        """All of several."""
+        """Concatenate several sets of boxes."""
         columns = ("place", "along", "normal", "size")
         return cls(*(np.concatenate([np.zeros((0, 3)), *(getattr(p, name) for p in parts)]) for name in columns))
 
@@ -148,14 +148,14 @@ class Surroundings:
 
     @cached_property
     def tops(self) -> Int[np.ndarray, "triangle"]:
-        """Triangles of tops."""
+        """Indices of the triangles of tops."""
         height = self._corners[:, :, 2].mean(axis=1) - self.floor
         able = ~(self._clear | self._built) & (height > TOPS[0]) & (height < TOPS[1])
         return np.flatnonzero(able & (self._normals[:, 2] > LEVEL))
 
     @cached_property
     def ceilings(self) -> Int[np.ndarray, "triangle"]:
-        """Triangles of ceilings."""
+        """Indices of the triangles of ceilings."""
         above = self._corners[:, :, 2].mean(axis=1) - self.floor > CEILINGS
         return np.flatnonzero(~self._clear & above & (self._normals[:, 2] < -LEVEL))
 

@@ -34,7 +34,7 @@ class Face:
 
     @property
     def area(self) -> float:
-        """m^2."""
+        """Area of the face, m^2."""
         return (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
 
     @property

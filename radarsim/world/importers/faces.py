@@ -65,7 +65,7 @@ class Face:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Length of the face, m."""
         return self.high - self.low
 
     @property

@@ -43,8 +43,8 @@ class Trials(NamedTuple):
 
 
 class Chains(NamedTuple):
-    """Mirrors, frame, and the range of aims of each chain; those within reach are marked in `lit` from an index on, padded
-    to groups of eight."""
+    """Mirrors, frame, and the range of aims of each chain; those within reach are marked in `lit` from an index on,
+    padded to groups of eight."""
 
     mirrors: Int[np.ndarray, "chain 2"]
     frame: Int[np.ndarray, "chain"]

@@ -285,7 +285,7 @@ def _fresnel(patches, of, zones, way):
 
     Args:
         patches, of: see `strength`.
-        zones: the specular point, m; axes in which places about it are Fresnel units, 1/m; whether the way is shortest
+        zones: the specular point, m; axes in which places about it are Fresnel units, 1/m; whether the path is shortest
             or longest there; and whether it is inside, where no border is near.
         way: from where, to where, how long, and the wavelength, m.
     """

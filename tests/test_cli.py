@@ -130,7 +130,7 @@ def test_debug_shows_the_traceback():
     assert done.returncode != 0 and "Traceback" in done.stderr and "InputError" in done.stderr
 
 
-def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
+def test_an_interrupt_reports_what_was_kept(capsys, monkeypatch, tmp_path):
     def interrupted(scene, output, **_):
         config = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
         with RecordingWriter(output, config) as writer:

@@ -158,7 +158,7 @@ def test_settings_that_no_radar_takes():
         Sensor(config, write_cfg(config), "a.cfg", "/dev/null", network=network())
 
 
-def test_small_buffers_are_told():
+def test_small_buffers_give_a_warning():
     assert buffer_warning(64 << 20, PRESETS["radarize"]) == []
     (words,) = buffer_warning(208 << 10, PRESETS["radarize"])
     assert "holds 208 KiB, a quarter of a second needs 1080" in words and "sysctl net.core.rmem_max" in words

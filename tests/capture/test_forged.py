@@ -55,7 +55,7 @@ def test_what_lies_far_away_is_left_out(places):
     assert "far from all others" in assembler.counts.warnings()[0]
 
 
-def test_a_gap_is_believed_when_several_packets_agree():
+def test_a_gap_is_accepted_when_several_packets_agree():
     left = [packet for packet in SENT if not 300 < packet.sequence <= 1500]  # 1.7 MB
     adc, valid, assembler = assembled(left)
     assert len(adc) == len(FRAMES) and np.array_equal(adc[valid], FRAMES[valid])

@@ -47,7 +47,7 @@ def test_only_the_page_itself_asks(host, origin, answer):
             assert asked(page, *given, path=path).startswith(f"HTTP/1.0 {answer} ")
 
 
-def test_one_connection_too_many_is_told_so(monkeypatch):
+def test_one_connection_too_many_is_refused(monkeypatch):
     monkeypatch.setattr(module, "_CLIENTS", 2)
     with LivePage("127.0.0.1:0") as page:
         held = [connected(page) for _ in range(2)]

@@ -71,7 +71,7 @@ def test_seeds_depend_on_nothing_but_seed_and_name(tmp_path):
     assert not set(seeds.values()) & {task.seed for task in load(tmp_path, seed=2).tasks}
 
 
-def test_parameters_tell_recordings_apart(tmp_path):
+def test_parameters_distinguish_recordings(tmp_path):
     """All parameters that determine the bytes change the identity; moving a file does not."""
     plain = load(tmp_path).tasks[3].identity
     scene = tmp_path / "mine.yaml"

@@ -74,7 +74,7 @@ def test_our_own_capture_loses_nothing(tmp_path):
         (["REC", "--loss", "2"], "loss"),
     ],
 )
-def test_the_command_line_says_what_is_wrong(tmp_path, capsys, arguments, message):
+def test_the_command_line_reports_what_is_wrong(tmp_path, capsys, arguments, message):
     record(tmp_path / "r.h5", SMALL, 1)
     arguments = [str(tmp_path / "r.h5") if argument == "REC" else argument for argument in arguments]
     with pytest.raises(SystemExit) as exit_:

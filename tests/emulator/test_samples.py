@@ -149,7 +149,7 @@ def test_2500_packets_through_a_bad_network(tmp_path):
     assert received == expected
 
 
-def test_a_source_that_is_too_slow_makes_frames_late_and_says_so(tmp_path):
+def test_a_source_that_is_too_slow_makes_frames_late_with_a_warning(tmp_path):
     adc = record(tmp_path / "r.h5", SMALL, 12)
     with attached(Slow(tmp_path / "r.h5"), ahead=0) as (emulator, client, lines):
         client.record()

@@ -56,7 +56,7 @@ def test_somebody_is_seen(walk):
     assert nearer.any() and not (full > empty + 1e-3).any()
 
 
-def test_none_is_none_and_a_full_room_is_told(walk):
+def test_none_is_none_and_a_full_room_is_an_error(walk):
     scene, motion = walk
     assert with_pedestrians(scene, motion, 0, 3) is scene
     floor = {"name": "floor", "shape": "rectangle", "size": [2.2, 2.2], "facing": [0, 0, 1], "material": "concrete"}

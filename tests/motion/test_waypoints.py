@@ -132,7 +132,7 @@ def test_places_behind_a_closed_door(tmp_path):
     assert plan_motion(scene, "robot", None, np.random.default_rng(0), places[:2]).duration > 3
 
 
-def test_the_recording_tells_its_motion(tmp_path):
+def test_the_recording_describes_its_motion(tmp_path):
     """Statistics of a recording: through way-points on the command line, cut short; and along poses through a wall."""
     from radarsim.cli import app
 

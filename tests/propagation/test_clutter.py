@@ -186,7 +186,7 @@ def test_hidden_things_are_not_seen():
     assert everything(things).position[:, 0].max() > 3.5
 
 
-def test_none_at_level_nought():
+def test_none_at_level_zero():
     """A scene of level 0 has only the scatterers of its surfaces, the same as without clutter."""
     scene = room(0.0)
     rng = np.random.default_rng(0)

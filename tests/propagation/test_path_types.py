@@ -79,7 +79,7 @@ def test_an_image_beside_a_wall(gap, ghost):
 
 
 @pytest.mark.filterwarnings("error")
-def test_one_antenna_tells_no_directions_apart():
+def test_one_antenna_resolves_no_directions():
     """The image beside a wall that a row of eight antennas separates from the wall is at its range: no ghost for
     one."""
     alone = CONFIG.model_copy(update={"tx_order": (0,), "rx": (0,)})

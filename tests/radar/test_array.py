@@ -83,7 +83,7 @@ def test_channels_of_the_low_power_board_are_reversed_by_turns():
     assert BOARDS["iwrl6432boost"].nominal_calibration == ((1, 0), (-1, 0)) * 3
 
 
-def test_rows_less_than_a_wavelength_apart_tell_elevation():
+def test_rows_less_than_a_wavelength_apart_resolve_elevation():
     """The AWR2944's rows are 0.8 wavelengths apart; every second row of the AOP's column would be one apart."""
     config = radar("awr2944evm")
     pairs, grid = elevation_pairs(config), _grid("awr2944evm")

@@ -82,7 +82,7 @@ def test_sizes_that_do_not_fit():
 
 
 @pytest.mark.parametrize("iq_order", ["iiqq", "qqii"])
-def test_near_echoes_tell_the_iq_order(iq_order):
+def test_near_echoes_show_the_iq_order(iq_order):
     config = small(samples=64, iq_order=iq_order)
     rng = np.random.default_rng(1)
     tones = np.exp(2j * np.pi * np.outer([3.3, 9.1, 20.2], np.arange(64)) / 64)
@@ -94,7 +94,7 @@ def test_near_echoes_tell_the_iq_order(iq_order):
         assert range_balance(decoded) * (1 if order == iq_order else -1) > 10
 
 
-def test_noise_or_silence_does_not_tell_the_iq_order():
+def test_noise_or_silence_does_not_show_the_iq_order():
     config = small(samples=64, loops=16)
     noise = np.random.default_rng(2).normal(0, 50, (4, *config.frame_shape)).astype(np.int16)
     assert abs(range_balance(noise)) < 1

@@ -50,7 +50,7 @@ def test_an_echo_of_two_at_once_has_the_phase_of_the_middle():
     assert ratio == pytest.approx(np.full(4, ratio[0])) and abs(ratio[0].imag) < 1e-9
 
 
-def test_what_is_lost_is_said():
+def test_losses_are_reported():
     assert losses(PRESET) == []
     assert "TX1 and TX2 fire at once" in losses(parse_cfg(text(3)))[0]
     assert "of 8 virtual antennas 4 are left" in losses(parse_cfg(text(3)))[0]

@@ -30,7 +30,7 @@ from radarsim.receiver.phasenoise import density
 from radarsim.recording.simulate import simulate
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
-from tests.radars import radar, tells_elevation
+from tests.radars import radar, resolves_elevation
 
 PRESET = PRESETS["radarize"]
 MEASURED = tuple((float(k), 0.5) for k in range(12))
@@ -73,7 +73,7 @@ def found(config: RadarConfig, samples: np.ndarray) -> tuple[float, float, float
     spectrum = maps.spectrum(samples)[0].numpy()
     power = (np.abs(spectrum) ** 2).sum(axis=-1) * (abs(maps.ranges - 2.2) < 1.9)[:, None]  # leakage is around zero
     row, column = np.unravel_index(power.argmax(), power.shape)
-    ends = (60, 35 if tells_elevation(config) else 0)
+    ends = (60, 35 if resolves_elevation(config) else 0)
     a, e = np.meshgrid(*(np.deg2rad(np.arange(-end, end + 0.1, 0.5)) for end in ends), indexing="ij")
     towards = np.stack([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)], axis=-1)
     antennas = (tx_positions(config)[:, None] + rx_positions(config)).reshape(-1, 3)
@@ -96,13 +96,13 @@ def test_a_target_is_found_where_it_is(own, board, azimuth, elevation):
     """Within the effect of the channels' errors, 3 deg at most, on four antennas in a row or two in a column. An array
     without elevation gives level directions."""
     config = radar(own if board == "mine.yaml" else board)
-    elevation = elevation if tells_elevation(config) else 0
+    elevation = elevation if resolves_elevation(config) else 0
     distance, left, up = found(config, burst(sphere(azimuth, elevation), config))
     assert distance == pytest.approx(2.5, abs=config.range_resolution)
     assert left == pytest.approx(azimuth, abs=1.5) and up == pytest.approx(elevation, abs=2.0)
 
 
-@pytest.mark.parametrize("board", [name for name in BOARDS if tells_elevation(radar(name))])
+@pytest.mark.parametrize("board", [name for name in BOARDS if resolves_elevation(radar(name))])
 def test_elevation_aware_maps_show_what_is_level(board):
     """The mean of an elevation pair passes a level echo unattenuated, as in the plain map. With uncorrected receiver
     signs, a pair of the AOP cancels."""
@@ -124,7 +124,7 @@ def test_points_of_two_seconds_lie_where_the_target_is(tmp_path, board):
     """From a .cfg through a recording to the chip's point cloud: azimuth, and elevation where the array resolves it."""
     config = radar(board).changed("radar", frame_period=0.25, loops=16)
     (tmp_path / "radar.cfg").write_text(write_cfg(config))
-    elevation = 8 if tells_elevation(config) else 0
+    elevation = 8 if resolves_elevation(config) else 0
     simulate(
         sphere(15, elevation), tmp_path / "a.h5", radar=str(tmp_path / "radar.cfg"), duration=2.0, seed=2,
         trajectory=_still(tmp_path / "still.tum", 24),

@@ -27,7 +27,7 @@ def walk(tmp_path_factory):
     return simulate("office", tmp_path_factory.mktemp("sim") / "walk.h5", duration=0.17, seed=6)
 
 
-def test_the_recording_says_what_it_is(walk):
+def test_the_recording_describes_itself(walk):
     with Recording(walk) as recording:
         assert len(recording) == 5
         assert recording.attributes["scene"] == "office" and recording.attributes["seed"] == 6
@@ -118,7 +118,7 @@ def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
     assert not (tmp_path / "x.h5").exists()
 
 
-def test_what_fails_in_another_process_is_said_here(tmp_path):
+def test_failures_of_another_process_are_reported(tmp_path):
     (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
     far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     with pytest.raises(InputError, match="scene away: no frame has an echo"):

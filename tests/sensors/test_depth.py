@@ -82,7 +82,7 @@ def test_glass_is_looked_through_and_people_are_seen():
 
 
 @pytest.mark.parametrize("clear, seen", [(True, 4.0), (False, 2.0)])
-def test_what_light_passes_is_said_by_the_material(clear, seen):
+def test_transparency_follows_from_the_material(clear, seen):
     """A pane is transparent if its material is clear; a screen's black front never is."""
     own = Custom(permittivity=2.6, thickness=3e-3, clear=clear).material("own")
     pane, wall = box("pane", [2, -3, 0], [2.01, 3, 3], "glass"), box("wall", [4, -3, 0], [4.2, 3, 3])

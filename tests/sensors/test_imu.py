@@ -84,7 +84,7 @@ def test_allan_deviation_is_as_specified(errors):
     assert 0.5 * errors.instability < expected[-1] < 2 * errors.instability
 
 
-def test_the_bias_is_told():
+def test_the_bias_is_estimated():
     imu = Imu(beside(Motion.still((0, 0, 1), duration=30)))
     seen = rows(imu, 0, 900)
     found = np.hstack([seen["imu/accelerometer"], seen["imu/gyroscope"]]) - [0, 0, STANDARD_GRAVITY, 0, 0, 0]

@@ -39,7 +39,7 @@ def test_every_echo_is_in_the_window(velocity):
     assert spans.any() == (np.abs(closing).max() > CONFIG.max_velocity)
 
 
-def test_noise_and_a_single_transmitter_tell_nothing():
+def test_noise_and_a_single_transmitter_resolve_nothing():
     noise = np.random.default_rng(2).normal(0, 20, (3, *CONFIG.frame_shape)).astype(np.int16)
     assert not Aliases(CONFIG).of(Heatmaps(CONFIG).spectrum(noise)).any()
     single = CONFIG.model_copy(update={"tx_order": (0,)})

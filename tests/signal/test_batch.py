@@ -37,7 +37,7 @@ def test_what_is_made_is_made_once(signal, adc, monkeypatch):
     assert torch.equal(third.spectrum, signal.heatmaps.spectrum(adc[:3]))
 
 
-def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
+def test_losses_are_passed_to_the_spectrum(signal, adc):
     valid = np.ones((3, 16, 3), bool)
     valid[1, 2:] = False
     found = batch(signal, adc[:3], np.arange(3), valid).spectrum

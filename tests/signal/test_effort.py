@@ -54,7 +54,7 @@ def test_the_strongest_of_neighbouring_speeds_are_what_is_left():
     assert _essence(few) is few
 
 
-def test_it_is_said_before(tmp_path):
+def test_there_is_a_remark_before(tmp_path):
     assert effort(PRESET, 10) == "" and together(PRESET) == 16
     assert together(LARGEST) * LARGEST.frame_bytes <= 32 << 20
     times = 1024 * 255 / 96 / 32

@@ -117,7 +117,7 @@ def test_lost_chirps_weigh_nothing():
     assert np.degrees(np.arctan2(best[1], best[0])) == pytest.approx(10, abs=2.5)
 
 
-def test_two_transmitters_tell_no_height():
+def test_two_transmitters_resolve_no_height():
     points, _ = cloud(polar(2.0, 10, 10), config=PRESETS["two-tx"])
     assert points[:, 2].tolist() == [0.0] * len(points) and len(points) >= 1
 

@@ -163,7 +163,7 @@ def test_the_twin_takes_stamps_and_losses(real, tmp_path):
     assert medians(compare(tmp_path / "real.h5", made))["correlation_range_azimuth"] > 0.8
 
 
-def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
+def test_a_wrong_clock_and_a_wrong_heading_are_reported(real, tmp_path):
     def late(poses, file):
         file["truth/time"][:] += 0.4
         return poses
@@ -230,7 +230,7 @@ def test_a_board_with_calibration_and_bias(real, tmp_path):
     assert medians(found)["correlation_range_azimuth"] > 0.75 and not found.misfits()
 
 
-def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
+def test_what_is_missing_is_reported_in_a_sentence(real, tmp_path):
     def refused(recording=real, scene=PLACE, **options):
         with pytest.raises(InputError) as caught:
             make_twin(recording, scene, tmp_path / "x.h5", Options(**options))

@@ -34,7 +34,7 @@ def test_body_stays_together_and_on_the_floor():
     assert (center[:, 1, 2] == center[..., 2].max(axis=1)).all()
 
 
-def test_legs_alternate():
+def test_feet_alternate():
     """When the right foot swings forward the left one goes back, as seen from the trunk."""
     t = np.linspace(0, 5, 400)
     _, center = WALKER.poses(t)

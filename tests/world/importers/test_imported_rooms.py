@@ -89,7 +89,7 @@ def lying(mesh, up):
         (shapes.box((1, 1, 1.35), (6, 2.6, 2.7), without=("+y", "-y")), "alone has a floor"),
     ],
 )
-def test_the_mesh_says_which_way_is_up(tmp_path, suffix, up, place, why):
+def test_up_is_estimated_from_the_mesh(tmp_path, suffix, up, place, why):
     lying(place, up).export(tmp_path / f"place.{suffix}")
     done = import_scene(tmp_path / f"place.{suffix}", tmp_path / "out", Options(units="m"))
     assert np.ptp(Scene.load(done.path).bounds, axis=0) == pytest.approx(np.ptp(place.bounds, axis=0), abs=1e-5)
@@ -101,7 +101,7 @@ def test_the_mesh_says_which_way_is_up(tmp_path, suffix, up, place, why):
     assert size == pytest.approx(np.ptp(place.bounds, axis=0)[[0, 2, 1]], abs=1e-5)
 
 
-def test_where_the_mesh_says_nothing_the_format_does(tmp_path):
+def test_where_the_mesh_is_not_conclusive_the_format_decides(tmp_path):
     cube = shapes.box((0, 0, 0), (5, 3, 3))
     for suffix, up in (("obj", "z"), ("glb", "y")):
         cube.export(tmp_path / f"cube.{suffix}")

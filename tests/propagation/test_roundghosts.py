@@ -90,8 +90,8 @@ def pole_ghosts(bottom, tilt):
     the floor, both as the sum of the two orders of floor and pole."""
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
-    pole = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
-    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, pole))
+    rod = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
+    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, rod))
     points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
     points, normals = turned.apply(points) + center, turned.apply(normals)
     lit = points[:, 2] > 0
@@ -103,7 +103,7 @@ def pole_ghosts(bottom, tilt):
 @pytest.mark.parametrize("bottom", [0.0, -0.4, 0.03])
 @pytest.mark.parametrize("tilt", [0.0, 1e-6, -1e-6, 0.05, -0.05, 0.5, -0.5])
 def test_a_pole_on_a_level_floor(bottom, tilt):
-    """A table pole that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
+    """A pole that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
 
     With the floor it is a corner of 90 deg, whose ghosts come from its foot; tilted, from above or from below that.
     """

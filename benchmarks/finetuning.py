@@ -25,7 +25,7 @@ from radarize.baselines.pictures.network import PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.training import DENSE, elsewhere, entropy, unpacked
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.baselines.walks.walks import FIRST, PERIOD, Walk
 from radarize.evaluation.benchmark.choices import TRAINING
 from radarize.io.console import progress
@@ -127,7 +127,7 @@ def dense(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
         likely = net.estimate(pictures)
         for value, found in apart.items():
             shown = points(likely, value)[0].cpu().numpy()
-            found.append(Apart.of_pictures(shown, label[0].bool().cpu().numpy()).chamfer)
+            found.append(PointCloudDistance.of_pictures(shown, label[0].bool().cpu().numpy()).chamfer)
     return min(apart, key=lambda value: np.nanmedian(apart[value]))
 
 
@@ -164,7 +164,9 @@ def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distanc
             pictures = torch.from_numpy(window(walk, end, header.frames))[None, :, None].float()
             with torch.inference_mode():
                 cells = points(net.estimate(pictures), net.dense)[0].numpy()
-            apart.append([Apart.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))])
+            apart.append(
+                [PointCloudDistance.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))]
+            )
         found[walk.number] = Distances(*(float(each) for each in np.nanmedian(apart, axis=0)))
     return found, header
 

@@ -25,7 +25,7 @@ from radarize.baselines.pictures.network import PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.training import DENSE, Pictures
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.baselines.walks.walks import FIRST, Walk
 from radarize.evaluation.benchmark.choices import TRAINING
 from radarize.io.jobs import Report
@@ -152,7 +152,7 @@ def judged(net: PictureNet, windows: Real) -> dict[int, float]:
     for pictures, lidar in zip(windows.pictures, windows.lidar, strict=True):
         likely = net.estimate(torch.from_numpy(pictures)[None, :, None].float())
         for dense, found in apart.items():
-            found.append(Apart.of_pictures(points(likely, dense)[0].numpy(), lidar).chamfer)
+            found.append(PointCloudDistance.of_pictures(points(likely, dense)[0].numpy(), lidar).chamfer)
     best = min(apart.values(), key=np.nanmedian)
     walks = np.array(windows.walk)
     return {int(walk): float(np.nanmedian(np.array(best)[walks == walk])) for walk in np.unique(walks)}

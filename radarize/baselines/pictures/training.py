@@ -12,7 +12,7 @@ from radarize.baselines.pictures.network import COLUMNS, PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.roughening import uniform
 from radarize.baselines.pictures.task import PictureTask
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.learning.features.augment import chosen, mirrored
 from radarize.learning.features.table import Reading
 from radarize.learning.nets.weights import Network
@@ -73,7 +73,7 @@ class Pictures(PictureTask):
 def chamfer(found: Bool[Tensor, "item row column"], label: Float[Tensor, "item row other"]) -> Float[Tensor, "item"]:
     """Distance of points from a lidar's, m; half the reach of a picture where either has none."""
     clouds = zip(found.cpu().numpy(), label.bool().cpu().numpy(), strict=True)
-    apart = np.nan_to_num([Apart.of_pictures(*each).chamfer for each in clouds], nan=polar.REACH / 2)
+    apart = np.nan_to_num([PointCloudDistance.of_pictures(*each).chamfer for each in clouds], nan=polar.REACH / 2)
     return torch.tensor(apart, dtype=torch.float32, device=label.device)
 
 

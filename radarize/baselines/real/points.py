@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from radarize.baselines.real.networks import Reader
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.baselines.walks.poses import BEARINGS, scan, stamps
 from radarize.baselines.walks.walks import FIRST, Walk
 from radarize.signal import polar
@@ -26,8 +26,8 @@ class Distances(NamedTuple):
     """How far a method's points of one frame are from the lidar's: of the same number, and of the same instant, nan
     where the lidar has no picture of it."""
 
-    number: Apart
-    instant: Apart
+    number: PointCloudDistance
+    instant: PointCloudDistance
 
 
 class Judged(NamedTuple):
@@ -67,7 +67,7 @@ def judge(
         told |= {name: known[frame] for name, known in others.items() if frame in known}
         for name, each in told.items():
             if frame >= FIRST:
-                apart = Distances(Apart.of(each, clouds[frame]), Apart.of(each, same))
+                apart = Distances(PointCloudDistance.of(each, clouds[frame]), PointCloudDistance.of(each, same))
                 found.apart.setdefault(name, []).append(apart)
         # The nearest points; pictures and CFAR have many that stand before a surface.
         scans = {name: scan(each) for name, each in (told | {"lidar": same}).items() if name not in _BEFORE}

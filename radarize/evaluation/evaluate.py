@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
 
-from radarize.evaluation.claims import pose_nees
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
+from radarize.evaluation.nees import pose_nees
 from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.io.alignment import Association, load, matched, trajectory, yaws
 from radarize.io.errors import InputError
@@ -67,7 +67,7 @@ def evaluate(
 
     Returns:
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`, of SLAM with ``nees``, see
-        `radarize.evaluation.claims.pose_nees`. Where the run knows the truth about them, ``map``:
+        `radarize.evaluation.nees.pose_nees`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
         Where the run tells it, ``blind``: `radarize.odometry.blindness.BlindSpans`.
 

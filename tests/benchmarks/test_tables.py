@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarize.evaluation.benchmark.dataset import DataSet
-from radarize.evaluation.benchmark.followed import FrameErrors
+from radarize.evaluation.benchmark.frame_errors import FrameErrors
 from radarize.evaluation.benchmark.runs import figures
 from radarize.evaluation.motion import velocity_errors
 from radarize.pipeline.run import run
@@ -38,16 +38,16 @@ def test_a_recording_says_what_it_is_of(recording, judged):
 
 def test_frames_of_a_run_tell_what_its_metrics_tell(judged):
     folder, found = judged
-    followed = FrameErrors.read(folder)
-    velocity = velocity_errors(followed.velocity, followed.true_velocity, followed.covariance)
+    frames = FrameErrors.read(folder)
+    velocity = velocity_errors(frames.velocity, frames.true_velocity, frames.covariance)
     assert velocity["rmse"] == pytest.approx(found["velocity"]["rmse"], rel=1e-5)
     # Errors of single steps and of windows of eight are those of the same path.
-    steps, _ = followed.turned(0)
-    assert len(steps) == len(followed.velocity) - 1
+    steps, _ = frames.yaw_errors(0)
+    assert len(steps) == len(frames.velocity) - 1
     path = np.cumsum([0, *steps])
-    windows, variance = followed.turned(8 * followed.period)
+    windows, variance = frames.yaw_errors(8 * frames.period)
     np.testing.assert_allclose(windows, path[8:] - path[:-8], atol=1e-6)
-    at_once = followed.errors.motions(followed.poses, np.arange(len(variance)), 8)[:, 2, 2]
+    at_once = frames.errors.motions(frames.poses, np.arange(len(variance)), 8)[:, 2, 2]
     np.testing.assert_allclose(variance, at_once, rtol=1e-6)
     assert found["quantiles"]["odometry"][-1] == pytest.approx(found["odometry"]["ate"]["position"]["max"], abs=1e-4)
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from radarize.evaluation.benchmark.followed import FrameErrors, joined, turn_nees, turned
+from radarize.evaluation.benchmark.frame_errors import FrameErrors, joined, joined_yaw_errors, yaw_nees
 from radarize.evaluation.benchmark.protocol import figures_of
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Study
@@ -74,7 +74,7 @@ def steps_table(study: Study) -> Table:
 
 def row(runs: pd.DataFrame, found: Sequence[FrameErrors]) -> dict[str, object]:
     """Figures of several recordings: of all their frames, and means over trajectories."""
-    frames, turns = joined(found), Statistics.of(turned(found, WINDOW)[0])
+    frames, turns = joined(found), Statistics.of(joined_yaw_errors(found, WINDOW)[0])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     relative = {name: figures_of(runs, columns).mean() for name, columns in RELATIVE.items()}
     known = np.isfinite(velocity["nees"])
@@ -87,6 +87,6 @@ def row(runs: pd.DataFrame, found: Sequence[FrameErrors]) -> dict[str, object]:
         **figures_of(runs, ABSOLUTE).mean(),
         **{name: ", ".join(f"{value:.4f}" for value in values) for name, values in relative.items()},
         "NEES velocity (median)": with_median(velocity["nees"], velocity["nees_median"]) if known else None,
-        "NEES yaw step": turn_nees(found, 0),
-        "NEES yaw over 0.27 s": turn_nees(found, WINDOW),
+        "NEES yaw step": yaw_nees(found, 0),
+        "NEES yaw over 0.27 s": yaw_nees(found, WINDOW),
     }

@@ -9,13 +9,13 @@ import pandas as pd
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from radarize.evaluation.benchmark.followed import FrameErrors, joined, true_poses
+from radarize.evaluation.benchmark.frame_errors import FrameErrors, joined, true_poses
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Chosen, Study
 from radarize.evaluation.benchmark.table import NONE, Table, with_error, with_median
-from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
+from radarize.evaluation.nees import nees
 from radarize.io.alignment import trajectory, yaws
 from radarize.io.pose import Pose, between, wrap
 from radarize.io.tum import planar
@@ -82,7 +82,7 @@ def tables(study: Study) -> list[Table]:
 def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
     """Figures of some walks and of their runs' folders; means with standard errors over walks."""
     odometry, slam = runs[ERRORS["odometry m"]], runs[ERRORS["SLAM m"]]
-    frames = joined([_followed(path) for path in paths])
+    frames = joined([_frame_errors(path) for path in paths])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     return {
         "odometry m": with_error(odometry),
@@ -107,11 +107,11 @@ def _against(first: pd.DataFrame, runs: pd.DataFrame) -> dict[str, str]:
 
 
 @cache
-def _followed(run: Path) -> FrameErrors:
+def _frame_errors(run: Path) -> FrameErrors:
     return FrameErrors.read(run)
 
 
-def pose_nees(poses: Pose, true: Pose, errors: ErrorModel, starts: range, length: int) -> Float[np.ndarray, "window"]:
+def motion_nees(poses: Pose, true: Pose, errors: ErrorModel, starts: range, length: int) -> Float[np.ndarray, "window"]:
     """Squared error of a motion over windows of some frames over what it claims, per dimension.
 
     Args:
@@ -122,7 +122,7 @@ def pose_nees(poses: Pose, true: Pose, errors: ErrorModel, starts: range, length
     """
     first = np.array(starts)
     moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
-    return normalised(between(truly, moved), errors.motions(poses, first, length))
+    return nees(between(truly, moved), errors.motions(poses, first, length))
 
 
 @cache
@@ -134,14 +134,14 @@ def _nees(run: Path, span: float) -> np.ndarray:
     rate = 1 / np.median(np.diff(times))
     starts = range(0, len(times) - round(span * rate), max(round(rate), 1))
     return (
-        pose_nees(planar(poses), true_poses(folder), folder.errors, starts, round(span * rate))
+        motion_nees(planar(poses), true_poses(folder), folder.errors, starts, round(span * rate))
         if starts
         else np.empty(0)
     )
 
 
 def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:
-    """Of `pose_nees`; the median over that of honest claims, 2.366 of three dimensions."""
+    """Of `motion_nees`; the median over that of honest claims, 2.366 of three dimensions."""
     found = np.concatenate([_nees(run, span) for run in runs])
     return (float(found.mean()), float(np.median(found) / (2.366 / 3))) if len(found) else (np.nan, np.nan)
 

@@ -11,7 +11,7 @@ import pytest
 from radarize.evaluation.benchmark import odometry, runtime
 from radarize.evaluation.benchmark.choices import CHOICES, SETS, helped
 from radarize.evaluation.benchmark.dataset import DataSet, groups
-from radarize.evaluation.benchmark.followed import FrameErrors
+from radarize.evaluation.benchmark.frame_errors import FrameErrors
 from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, commit
 from radarize.evaluation.benchmark.table import PAPER, Table
 from radarize.evaluation.metrics import evaluate_trajectory

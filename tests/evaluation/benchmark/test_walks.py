@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from radarize.evaluation.benchmark.walks import pose_nees
+from radarize.evaluation.benchmark.walks import motion_nees
 from radarize.io.pose import compose
 from radarize.odometry.uncertainty import ErrorModel, MotionCovariance
 
@@ -25,7 +25,7 @@ def test_claims_of_steps_add_up_to_those_of_poses(monkeypatch):
     for length in (5, FRAMES - 1):
         walks = range(WALKS)
         claims = ErrorModel.independent(steps)
-        found = [pose_nees(poses[:, walk], true[:, walk], claims, range(1), length) for walk in walks]
+        found = [motion_nees(poses[:, walk], true[:, walk], claims, range(1), length) for walk in walks]
         assert np.mean(found) == pytest.approx(1, abs=0.1)
-    quarter = pose_nees(poses[:, -1], true[:, -1], ErrorModel.independent(steps / 4), range(1), FRAMES - 1)
+    quarter = motion_nees(poses[:, -1], true[:, -1], ErrorModel.independent(steps / 4), range(1), FRAMES - 1)
     assert quarter == pytest.approx(4 * found[-1])

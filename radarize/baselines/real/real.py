@@ -30,7 +30,7 @@ from radarize.baselines.real.motion import (
 from radarize.baselines.real.networks import READERS, readers
 from radarize.baselines.real.points import Distances, Judged, judge
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.poses import by_instant, poses_of
+from radarize.baselines.walks.poses import matched_by_time, poses_of
 from radarize.baselines.walks.walks import PERIOD, Predictions, Walk
 from radarize.evaluation.benchmark.choices import NamedWalk as Facts
 from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, command, machine
@@ -191,8 +191,8 @@ def _compare(walk: Walk, options: RealOptions, report: Report) -> _Compared:
 def clocked_turn_errors(
     found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "frame 3"], clock: Clock
 ) -> dict[str, float]:
-    """Errors of turns up to each frame (rad), by number and by instant."""
-    same = turn_errors(found, by_instant(poses, clock))
+    """Return errors of changes of yaw up to each frame (rad), with poses matched by frame index and by time."""
+    same = turn_errors(found, matched_by_time(poses, clock))
     return turn_errors(found, poses) | {"instant_yaw_rmse_deg": same["yaw_rmse_deg"]}
 
 

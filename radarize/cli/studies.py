@@ -83,7 +83,7 @@ def benchmark(
     ] = None,
     train: Annotated[bool, typer.Option("--train", help="Train networks on each split first.")] = False,
     epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
-    protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper, or corrected; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
     walks: Annotated[str | None, typer.Option(help="real: walks to judge, 227,230; by default all that test.")] = None,
@@ -111,7 +111,7 @@ def benchmark(
     chosen = [method for word in methods or () for method in word.split(",")]
     options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
     with progress("benchmark", f"what has ended is kept in {out}, and the same command goes on after it") as report:
-        published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
+        published = compare(name, data, out, options, progress=report, log=lambda line: typer.echo(line, err=True))
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")

@@ -80,7 +80,8 @@ def test_a_real_walk(recordings, tmp_path):
 
 
 def test_pictures_of_one_number_that_are_not_of_one_instant(tmp_path):
-    """A warning says so; aligned, truth is of the same instants, and frames that the lidar did not see are left out."""
+    """There is a warning; with --align, the truth is matched by time, and frames without a lidar picture are left
+    out."""
     walk = MadeUp(tmp_path / "clone", 7, 320, first=-30.0, rate=1.08)
     walk.write(walk.folder)
     times = 0.05 * np.arange(320)

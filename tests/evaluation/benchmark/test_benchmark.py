@@ -256,9 +256,9 @@ def test_bad_input_is_one_sentence(rooms, tmp_path, name, choices, expected):
         benchmark(name, rooms, tmp_path / "out", Options(**choices))
 
 
-def test_radars_stand_beside_each_other(toys, tmp_path, monkeypatch):
-    """Two walks by one radar, one by another; a path that is a tenth too long is off by a tenth of its way from its
-    middle."""
+def test_table_by_radar(toys, tmp_path, monkeypatch):
+    """Two walks of one radar, one of another. If all displacements are 10 % too long, the position error of a pose is
+    10 % of its distance from the mean position."""
     folder, off = tmp_path / "radars", []
     folder.mkdir()
     for seed, chirps in enumerate(("far", "far", "near")):

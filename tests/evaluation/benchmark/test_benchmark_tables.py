@@ -120,7 +120,7 @@ def test_results_have_their_provenance_and_can_be_read_again(tmp_path):
     text = RESULTS.write(tmp_path, "x").read_text()
     assert "| a | 0.1235 | 3 |\n| b | - | - |\n\n- A note.\n" in text and text.startswith("# Two\n\n## One\n")
     assert text.endswith(
-        "- Of all.\n- **Data**: d, 1 recordings, 12 m walked, all simulated, seed 5; 1 of 1 tuned_on to choose scans "
+        "- Of all.\n- **Data**: d, 1 recordings, 12 m walked, all simulated, seed 5; 1 of 1 in the tuning set of scans "
         "and the back end's preset radar.\n- **Networks**: rotation, 1,234,567 parameters, trained on training "
         "(random-0), 5 epochs.\n- **Command**: `c`.\n- **Machine**: processor abacus, cores 2, version 0, commit abc "
         "(clean).\n"
@@ -161,7 +161,7 @@ def test_path_length_and_origin_of_a_recording(rooms):
     assert "2 recordings, 0 m walked (1 without true poses), 1 simulated, 1 real" in data.sentence
 
 
-def test_which_recordings_helped_to_choose_is_looked_up():
+def test_recordings_of_tuning_sets_are_listed():
     tasks = Specification.load("evaluation").tasks
     assert [task.seed for task in tasks] == [seed for seeds in SETS["EVALUATION"].values() for seed in seeds]
     walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in SETS["EVALUATION"].items() for seed in seeds]

@@ -1,6 +1,6 @@
-"""Figures in README and docs, taken from the parts of the pages: `python -m benchmarks.figures` writes them anew.
+"""Figures in README and docs, from the parts of the pages of results: `python -m benchmarks.figures` updates them.
 
-A figure stands between two comments, and `FIGURES` says what it is:
+A figure is enclosed by two comments; `FIGURES` has the functions that write them:
 
     On test walks the mean error is <!-- figures: walks-mean -->0.13 and 0.034 m<!-- end -->.
 """
@@ -29,18 +29,18 @@ Row = Mapping[str, Any]
 
 
 def rows(part: str, title: str = "") -> list[Row]:
-    """Of a part's first table whose title ends so."""
+    """Return the rows of a part's first table whose title ends with a text."""
     tables = Results.read(PARTS / f"{part}.json").tables
     return next(table.rows for table in tables if table.title.lower().endswith(title))
 
 
 def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    """As Markdown."""
+    """Format a table as Markdown."""
     return "\n".join("| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *lines))
 
 
 def walks() -> str:
-    """Errors by platform, and of the worst walk."""
+    """Return the table of errors by platform, and of the worst walk."""
     means, each = {row["on"]: row for row in rows("walks", "by platform and building")}, rows("walks", "walk by walk")
     lines = []
     for words, kind in (("odometry", "odometry"), ("SLAM", "SLAM")):
@@ -50,21 +50,21 @@ def walks() -> str:
 
 
 def walks_mean() -> str:
-    """Of odometry and of SLAM over all walks."""
+    """Return the mean errors of odometry and of SLAM over all walks."""
     mean = next(row for row in rows("walks", "by platform and building") if row["on"] == "all")
     odometry, slam = (float(mean[f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
     return f"{odometry:.2f} and {slam:.3f} m"
 
 
 def paper() -> str:
-    """Odometry by the paper's protocol, beside the paper's figures."""
+    """Return the table of odometry by the paper's protocol, with the paper's results."""
     shown = [row for row in rows("odometry") if isinstance(row["paper: ATE m"], float)]
     lines = [[row["odometry"], f"{row['ATE m']:.2f}", f"{row['paper: ATE m']:.2f}"] for row in shown]
     return table(["odometry", "ATE, m (simulated)", "in the paper (real)"], lines)
 
 
 def scans() -> str:
-    """Scans and maps by method."""
+    """Return the table of scans and maps by method."""
     head = {"within 10 cm %": 1, "returned %": 1, "ghosts left %": 1, "map F1 %": 1, "SLAM ATE m": 3}
     lines = [
         [row["scans"], *(f"{row[name]:.{digits}f}" for name, digits in head.items())]
@@ -75,7 +75,7 @@ def scans() -> str:
 
 
 def multipath() -> str:
-    """Ranking at the worst step."""
+    """Return the ranking of scans at the largest severity of multipath."""
     head = {"ghosts, % of returns": 1, "missed surfaces, % of bearings": 1, "map F1, %": 1, "SLAM ATE, m": 3}
     lines = [
         [row["scans"], *(f"{row[name]:.{digits}f}" for name, digits in head.items())]
@@ -86,7 +86,7 @@ def multipath() -> str:
 
 
 def conditions() -> str:
-    """Plain walks, and the conditions under which SLAM errs at least twice as much."""
+    """Return the table of plain walks, and of conditions with at least twice their SLAM error."""
     times = "times the plain walks'"
     shown = [row for row in rows("conditions") if row["condition"] == "plain" or row[times] >= 2]
     lines = [[row["condition"], row["odometry m"], row["SLAM m"], f"{row[times]:.1f}"] for row in shown]
@@ -94,7 +94,7 @@ def conditions() -> str:
 
 
 def radars() -> str:
-    """Each radar without networks, and with what is chosen for it."""
+    """Return the table of each radar without networks, and with its default methods."""
     found, lines = rows("radars"), []
     for radar in dict.fromkeys(row["radar"] for row in found):
         without = next(row for row in found if row["radar"] == radar and row["scans"] == "first-echo")
@@ -105,7 +105,7 @@ def radars() -> str:
 
 
 def real() -> str:
-    """Distances of points on real walks matched by time, and in brackets matched by frame index."""
+    """Return the table of point-cloud distances on real walks, matched by time, and in brackets by frame index."""
     found, lines = rows("real", "real walks"), []
     for method, words in METHODS.items():
         cells = []
@@ -118,14 +118,14 @@ def real() -> str:
 
 
 def realism() -> str:
-    """How many pictures a network tells apart."""
-    shares = [row for row in rows("realism") if str(row["what"]).startswith("told apart")]
+    """Return the shares of pictures that a network classifies correctly as real or simulated."""
+    shares = rows("realism")[:2]  # the rows of the discriminator: single pictures, pairs
     return " and ".join(f"{row['furnished']:.0f} % of {words}" for row, words in zip(
         shares, ("single pictures", "pairs"), strict=True))  # fmt: skip
 
 
 def back_end() -> str:
-    """Lidar logs beside Cartographer."""
+    """Return the table of lidar logs, with Cartographer's results."""
     logs = [row for row in rows("slam_backend") if row["case"] in [f"lidar, {log}" for log in LOGS]]
     lines = [[log, f"{row['ATE m']:.3f} m", row["to beat"].split(",")[0]] for log, row in zip(LOGS, logs, strict=True)]
     return table(["lidar log", "ATE", "Cartographer's at its best settings"], lines)
@@ -139,10 +139,10 @@ FIGURES: dict[str, Callable[[], str]] = {
 
 
 def written(text: str) -> str:
-    """A page with its figures as they are now.
+    """Return the text of a page with its figures updated.
 
     Raises:
-        KeyError: a figure that is none.
+        KeyError: an unknown figure.
     """
 
     def anew(found: re.Match[str]) -> str:
@@ -154,7 +154,7 @@ def written(text: str) -> str:
 
 
 def pages() -> list[Path]:
-    """That have figures."""
+    """Return all pages that have figures."""
     return [page for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))) if "<!-- figures: " in
             page.read_text()]  # fmt: skip
 

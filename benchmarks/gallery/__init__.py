@@ -1,4 +1,4 @@
-"""Physical laws: each a function that draws theory and simulation on an axis, and says how far they are apart.
+"""Physical laws: functions that plot theory and simulation on an axis, and return the error of the simulation as text.
 
-Its docstring says the law. `benchmarks.physics_gallery` makes a page of them.
+The docstring of a function states the law. `benchmarks.physics_gallery` makes a page of them.
 """

@@ -25,7 +25,7 @@ def nees(
 
 
 def pose_nees(
-    errors: TrajectoryErrors, times: Float[np.ndarray, "pose"], covariances: Float[np.ndarray, "pose 3 3"]
+    errors: TrajectoryErrors, times: Float[np.ndarray, "pose"], covariances: Float[np.ndarray, "covariance 3 3"]
 ) -> float:
     """Return the mean NEES per dimension of the motion since the first pose: 1 if its covariances are consistent.
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib import pyplot
 
+from radarize.evaluation.benchmark.archive import bags, import_archive
 from radarize.evaluation.benchmark.dataset import DataSet
 from radarize.evaluation.benchmark.results import Results, machine
 from radarize.evaluation.benchmark.study import BENCHMARKS, Benchmark, Options, Study, carry_out
@@ -31,7 +32,7 @@ def benchmark(
 
     Args:
         name: a key of `BENCHMARKS`, or ``all``.
-        data: folder of recordings.
+        data: folder of recordings, or of bags of the Radarize data set, which are imported to `output`/recordings.
         output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark (NAME.png if it has plots), and
             index.html; ``runs``, ``timings`` and ``weights``, which are used again.
         options: methods, networks and protocol.
@@ -49,7 +50,10 @@ def benchmark(
         raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*known, ALL))}")
     options.check()
     machine()  # read now, because sources may change during a long run
-    found, output = DataSet.load(data), Path(output)
+    output = Path(output)
+    if bags(Path(data)):
+        data = import_archive(Path(data), output / "recordings", progress)
+    found = DataSet.load(data)
     studies: dict[str, Study] = {}
     for each in known if name == ALL else (name,):
         try:

@@ -164,7 +164,7 @@ def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distanc
             pictures = torch.from_numpy(window(walk, end, header.frames))[None, :, None].float()
             with torch.inference_mode():
                 cells = points(net.estimate(pictures), net.dense)[0].numpy()
-            apart.append(
+            distances.append(
                 [PointCloudDistance.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))]
             )
         found[walk.number] = Distances(*(float(each) for each in np.nanmedian(distances, axis=0)))

@@ -7,7 +7,7 @@ import pytest
 from radarize import cli
 from radarize.io.console import run
 from tests.evaluation.fake_run import write_run
-from tests.evaluation.report.test_report import SPANS, listing
+from tests.evaluation.report.test_report import SPANS, listing, with_facts
 
 
 @pytest.fixture

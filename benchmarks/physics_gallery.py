@@ -2,8 +2,8 @@
 
     python -m benchmarks.physics_gallery
 
-Laws are in `benchmarks.gallery`, references that tests use as well in `benchmarks.references`. To add a law, write it
-there and enter it in `LAWS`.
+Laws stand in `benchmarks.gallery`; references that tests use too in `benchmarks.references`. To add one, write it there
+and enter it in `LAWS`.
 """
 
 from pathlib import Path
@@ -26,18 +26,14 @@ WORDS = (
     ("image method, chain", "the radar seen in two or three mirrors one after another", "Allen, Berkley, JASA 1979"),
     ("Fresnel unit, aperture", "sqrt(lambda d (L - d) / 2L); what an opening passes", "Born, Wolf, ch. 8"),
     ("specular reflection", "the echo of a reflector that faces the radar", "Gordon, IEEE TAP 1975"),
-    (
-        "scattering pattern",
-        "angular distribution of a rough surface's diffuse echo",
-        "Degli-Esposti, IEEE TAP 2007",
-    ),
-    ("transmission, slab", "amplitude and delay of waves through a pane, door or board", "ITU-R P.2040"),
-    ("moving target", "an object that moves in the scene", "Skolnik, Radar Handbook"),
+    ("scattering pattern", "how a rough surface shares out its diffuse echo", "Degli-Esposti, IEEE TAP 2007"),
+    ("transmission, slab", "what a pane, door or board lets through, and how late", "ITU-R P.2040"),
+    ("moving target", "what moves by itself", "Skolnik, Radar Handbook"),
     ("moving plate", "the leaf of a door: a reflector and a slab that swings", "Chen, Micro-Doppler Effect in Radar"),
     ("sideband", "phase noise beside an echo", "Richards, Fundamentals of Radar Signal Processing"),
 )
 
-#: Sections of the page: function of the law, and labels of x and y.
+#: Sections of the page: what draws and measures, its docstring is the law; and labels of x and y.
 LAWS = {
     "Point target": (reflectors.point_target, "range, m", LEVEL),
     "Wall": (reflectors.wall_flash, "distance of a concrete wall, m", LEVEL),
@@ -49,30 +45,26 @@ LAWS = {
         "angle over 90 deg, deg",
         "echo over a square corner's, dB",
     ),
-    "Smooth surfaces": (reflectors.smooth_surfaces, "position along the track, relative", LEVEL),
-    "Box room": (rooms.box_room, "path length, m", "number of shorter images"),
-    "Thin pole": (rooms.thin_pole, "offset of the pole, mm", "level relative to that without the pole, dB"),
+    "Smooth surfaces": (reflectors.smooth_surfaces, "along the way", LEVEL),
+    "Box room": (rooms.box_room, "path, m", "images up to it"),
+    "Thin pole": (rooms.thin_pole, "offset of the pole, mm", "of the reflection without it, dB"),
     "Slab": (rooms.slab, "angle of incidence, deg", "TE coefficient, dB"),
-    "Panes": (rooms.panes, "range, m", "level relative to the maximum, dB"),
-    "Hollow wall": (rooms.hollow_wall, "range, m", "level relative to the front, dB"),
+    "Panes": (rooms.panes, "range, m", "over the largest, dB"),
+    "Hollow wall": (rooms.hollow_wall, "range, m", "over the front, dB"),
     "Phantom": (rooms.phantom, "azimuth, deg (left positive)", "range, m"),
-    "Moving door": (rooms.moving_door, "angle, deg", "closing speed of the specular reflection, m/s"),
+    "Moving door": (rooms.moving_door, "angle, deg", "closing speed of the reflection, m/s"),
     "Doppler signature": (signals.doppler, "azimuth, deg (left positive)", "closing speed, m/s"),
     "TDM slots": (signals.tdm, "closing speed, m/s", "phase against TX1, deg"),
-    "Within a burst": (signals.range_walk, "loop", "range by the beat frequency, m"),
-    "Thermal noise": (signals.noise, "receive gain, dB", "noise relative to k T B, dB"),
-    "Phase noise": (signals.phase_noise, "range bin", "phase noise, dBc/Hz"),
-    "Interference": (signals.interference, "time since the start of the ramp, us", LEVEL),
-    "Speckle": (surfaces.speckle, "amplitude relative to its scale", "cumulative share of cells"),
+    "Within a burst": (signals.range_walk, "loop", "range that the beat frequency stands for, m"),
+    "Thermal noise": (signals.noise, "receive gain, dB", "noise over k T B, dB"),
+    "Phase noise": (signals.phase_noise, "range bin", "dBc/Hz"),
+    "Interference": (signals.interference, "since the ramp's start, us", LEVEL),
+    "Speckle": (surfaces.speckle, "amplitude over its scale", "share of cells below"),
     "Speckle under motion": (surfaces.decorrelation, "sideways displacement, mm", "correlation with the field at rest"),
     "Convergence": (surfaces.convergence, "scatterers on 12 m2 of wall", "mean power per cell, dB"),
-    "Clutter": (surfaces.small_things, "radar cross section, dBsm", "cumulative share"),
-    "Uneven walls": (
-        surfaces.uneven_walls,
-        "displacement along the wall, mm",
-        "correlation of the specular reflection",
-    ),
-    "Reciprocity": (surfaces.reciprocity, "power of the difference relative to the field, dB", ""),
+    "Clutter": (surfaces.small_things, "radar cross section, dBsm", "share below"),
+    "Uneven walls": (surfaces.uneven_walls, "along the wall, mm", "correlation of the reflection"),
+    "Reciprocity": (surfaces.reciprocity, "power of the difference over the field's, dB", ""),
 }
 
 
@@ -80,13 +72,12 @@ def main() -> None:
     pictures = DOCS / "physics"
     pictures.mkdir(parents=True, exist_ok=True)
     page = (
-        "# Validation of the physics\n\n"
-        "Each plot compares the simulator with theory: a closed form, or an independently programmed sum. The "
+        "# The physics, law by law\n\n"
+        "Each plot compares the simulator with theory: a closed form, or a sum that was programmed independently. The "
         f"radar is the preset `radarize` (centre {CONFIG.center_frequency / 1e9:.2f} GHz). "
         "`python -m benchmarks.physics_gallery` writes this page, its figures and its plots. Tests in "
         "`tests/propagation` check the same laws.\n"
-        "\n## Terms\n\n| term | meaning | source |\n|---|---|---|\n"
-        + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
+        "\n## Words\n\n| here | is | source |\n|---|---|---|\n" + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
     )
     for title, (draw, x, y) in LAWS.items():
         figure, axis = plt.subplots(figsize=(5.4, 3.2))

@@ -1,4 +1,4 @@
-"""Physical laws: functions that plot theory and simulation on an axis, and return the error of the simulation as text.
+"""Physical laws: each a function that draws theory and simulation on an axis, and returns their difference in words.
 
-The docstring of a function states the law. `benchmarks.physics_gallery` makes a page of them.
+Its docstring is the law. `benchmarks.physics_gallery` makes a page of them.
 """

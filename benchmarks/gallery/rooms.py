@@ -1,4 +1,4 @@
-"""Reflection, transmission and diffraction by walls, panes, poles and doors."""
+"""What walls, panes, poles and doors make of a room."""
 
 from dataclasses import replace
 
@@ -52,22 +52,22 @@ def box_room(axis) -> str:
 
 
 def thin_pole(axis) -> str:
-    """The specular reflection of a wall at 2 m, while an opaque pole of 1 cm passes half way to the wall. Theory:
-    Kirchhoff's integral over the two-way path."""
+    """A wall's specular reflection, 2 m away, while an opaque pole of 1 cm passes half way to the wall. Theory:
+    Kirchhoff's integral, there and back."""
     offsets = np.arange(-15, 16) * 0.003
     theory, found = wall_past_pole(offsets)
     compare(axis, 1000 * offsets, theory, found)
     off = (found - theory)[np.abs(offsets) < 0.032]
     return (
-        f"Errors while the pole is in the first Fresnel zone: {np.abs(off).max():.1f} dB at most, {np.std(off):.1f} dB "
-        "RMS. Diffraction outside of it is left out. The visibility of specular reflections, of edges and corners of "
-        "plates, and of chains of mirrors more than 16 dB above the noise is computed in this way, by a lattice of "
-        "rays. Point scatterers have one ray each."
+        f"While the pole is in the first Fresnel zone: error of {np.abs(off).max():.1f} dB at worst, {np.std(off):.1f} "
+        "dB RMS. What it diffracts from farther off is left out. The visibility of specular reflections, of edges and "
+        "corners of plates, and of chains of mirrors that are 16 dB above the noise is measured like this, by a "
+        "lattice of rays. Scatterers have one ray each."
     )
 
 
 def slab(axis) -> str:
-    """Reflection and transmission of a pane. Theory: ITU-R P.2040, computed by the transfer matrices of its layers."""
+    """What a pane reflects and lets through. Theory: ITU-R P.2040, computed by the transfer matrices of its layers."""
     angles, worst = np.linspace(0, 80, 81), 0.0
     cosine = np.cos(np.deg2rad(angles))
     for name, color in (("glass", "tab:blue"), ("plasterboard", "tab:orange")):
@@ -96,8 +96,8 @@ def panes(axis) -> str:
     places = np.array([[peak(profile, -0.05, 0.05)[0] for profile in pane(name)] for name in PANES])
     off, lag = 1000 * np.ptp(places, axis=1).max(), 1000 * np.abs(places[:, 0] - NEAR).max()
     return (
-        f"Panes of {', '.join(PANES)} appear up to {lag:.0f} mm away from their front faces, in theory. Largest error "
-        f"of the simulator: {off:.1f} mm."
+        f"Panes of {', '.join(PANES)} seem to be up to {lag:.0f} mm off their front faces. The simulator is within "
+        f"{off:.1f} mm of that."
     )
 
 
@@ -109,8 +109,8 @@ def hollow_wall(axis) -> str:
     axis.set(ylim=(-45, 3))
     (there, size), (place, level) = peak(truth, 0.07, 0.15), peak(found, 0.07, 0.15)
     return (
-        f"Error of the rear board: {1000 * (place - there):+.0f} mm and {level - size:+.1f} dB. Multiple reflections "
-        "between the boards are left out, and inner faces have no mirror images of other objects."
+        f"The rear board has an error of {1000 * (place - there):+.0f} mm and {level - size:+.1f} dB. Waves that are "
+        "reflected between the boards more than once are left out, and inner faces mirror nothing else."
     )
 
 
@@ -129,15 +129,15 @@ def phantom(axis) -> str:
     part = power * near[:, None] * (np.abs(maps.azimuths - np.arctan2(image[1], image[0])) < 0.15)
     r, a = np.unravel_index(np.argmax(part), power.shape)
     return (
-        f"Error of the image's peak: {1e3 * (maps.ranges[r] - np.linalg.norm(image)):.0f} mm and "
+        f"The phantom's peak has an error of {1e3 * (maps.ranges[r] - np.linalg.norm(image)):.0f} mm and "
         f"{np.rad2deg(maps.azimuths[a] - np.arctan2(image[1], image[0])):.1f} deg; a bin is "
         f"{1e3 * CONFIG.range_resolution:.0f} mm."
     )
 
 
 def moving_door(axis) -> str:
-    """The specular reflection of a swinging door has the closing speed of the door's point nearest to the radar: the
-    angular rate times that point's distance from the hinge."""
+    """The specular reflection of a turning door comes nearer as fast as the point of the door that is nearest to the
+    radar: by the angular rate times that point's distance from the hinge."""
     angles = np.arange(78.0, 103.0)
     doors = [swinging(angle) for angle in angles]
     theory, found = [foot_speed(door) for door in doors], []
@@ -147,6 +147,7 @@ def moving_door(axis) -> str:
         found.append((path[0] - path[2]) / (4 * HALF))
     worst = compare(axis, angles, theory, found)
     return (
-        f"Largest error: {1e3 * worst:.1f} mm/s. A moving door reflects, transmits and scatters as the same door at "
-        "rest. One simplification: the specular point of a curved body seen over the door is constant during a burst."
+        f"Error: {1e3 * worst:.1f} mm/s at most. A moving door reflects, mirrors, lets through and scatters as the "
+        "same door at rest does. One simplification: the point where a round body, seen over the door, reflects "
+        "stays the same during a burst."
     )

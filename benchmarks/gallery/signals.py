@@ -20,7 +20,9 @@ def doppler(axis) -> str:
     theory = 0.85 * np.cos(maps.azimuths) + 0.85 * np.sin(maps.azimuths)
     axis.plot(np.rad2deg(maps.azimuths), theory, color="white", lw=1, label="0.85 cos + 0.85 sin")
     error = (found - theory)[np.abs(maps.azimuths) < 0.87]
-    return f"Median error of the ridge over azimuths within 50 deg: {abs(np.median(error)):.4f} m/s."
+    return (
+        f"The ridge is off the curve by {abs(np.median(error)):.4f} m/s, in the median of all azimuths within 50 deg."
+    )
 
 
 def tdm(axis) -> str:
@@ -32,7 +34,9 @@ def tdm(axis) -> str:
         axis.plot(speeds, np.rad2deg(theory[:, k]), color="black", lw=1)
         axis.plot(speeds, np.rad2deg(np.unwrap(found[:, k])), ls="", marker="o", ms=3.5, label=name)
     error = np.rad2deg(np.abs(np.angle(np.exp(1j * (found - theory)))).max())
-    return f"Largest phase error: {error:.2f} deg. Speeds up to {CONFIG.max_velocity:.3f} m/s are unambiguous."
+    return (
+        f"Phases have an error of {error:.2f} deg at most. Speeds up to {CONFIG.max_velocity:.3f} m/s are unambiguous."
+    )
 
 
 def range_walk(axis) -> str:
@@ -44,8 +48,8 @@ def range_walk(axis) -> str:
     worst = compare(axis, np.arange(len(found)), theory, found)
     walk = 1e3 * (found[0] - found[-1])
     return (
-        f"At 1.6 m/s the echo moves by {walk:.2f} mm; a bin is {1e3 * CONFIG.range_resolution:.1f} mm. Largest "
-        f"error of a chirp: {1e3 * worst:.3f} mm. Theory includes range-Doppler coupling."
+        f"At 1.6 m/s the echo moves by {walk:.2f} mm; a bin is {1e3 * CONFIG.range_resolution:.1f} mm. The worst "
+        f"chirp has an error of {1e3 * worst:.3f} mm. Theory includes range-Doppler coupling."
     )
 
 
@@ -60,12 +64,12 @@ def noise(axis) -> str:
         watts = np.mean(np.abs(counts) ** 2) / front.counts**2
         found.append(watts / (BOLTZMANN * ROOM_TEMPERATURE * CONFIG.sample_rate))
     worst = compare(axis, gains, db(noise_factor(gains)), db(np.array(found)))
-    return f"Largest error: {worst:.3f} dB over {len(gains)} gains."
+    return f"Error: {worst:.3f} dB at the worst of {len(gains)} gains."
 
 
 def phase_noise(axis) -> str:
-    """Phase noise adds sidebands of 4 L(f) sin^2(pi f tau) to each echo. The transmitter's noise is mixed with itself,
-    so the sidebands vanish with the delay tau."""
+    """Phase noise surrounds each echo with a skirt of 4 L(f) sin^2(pi f tau). The transmitter's noise is mixed with
+    itself, so the skirt vanishes with the delay tau."""
     bins, step, worst = np.arange(CONFIG.samples), CONFIG.sample_rate / CONFIG.samples, 0.0
     for cell, color in ((10, "tab:blue"), (40, "tab:orange"), (90, "tab:green")):
         off = np.where(bins == cell, np.nan, bins - cell)  # the echo itself is none of its skirt
@@ -75,7 +79,7 @@ def phase_noise(axis) -> str:
         axis.plot(bins, db(found), ".", ms=4, color=color, label=label)
         worst = max(worst, abs(db(found[far].mean() / theory[far].mean())))
     axis.set(ylim=(-150, -98))
-    return f"Largest error of the mean level of the sidebands: {worst:.2f} dB."
+    return f"The mean level of a skirt has an error of {worst:.2f} dB at most."
 
 
 def interference(axis) -> str:
@@ -90,6 +94,6 @@ def interference(axis) -> str:
     worst = np.abs(found - product).max() / np.abs(product).max()
     return (
         "Theory multiplies both waveforms in steps of 0.1 ns and filters the product; the simulator uses Fresnel "
-        "integrals. The other radar is 4 m away, its slope 2 MHz/us less. Largest error of a sample: "
-        f"{100 * worst:.3f} % of the peak. Only the direct path and its obstacles are simulated."
+        "integrals. The other radar is 4 m away, its slope 2 MHz/us less. The worst sample has an error of "
+        f"{100 * worst:.3f} % of the peak. Only the straight path counts, and what stands in its way."
     )

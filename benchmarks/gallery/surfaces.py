@@ -1,4 +1,4 @@
-"""Diffuse scatterers, small objects and unevenness of surfaces."""
+"""Scatterers, small things and unevenness of surfaces."""
 
 import numpy as np
 from scipy import stats
@@ -23,7 +23,7 @@ from radarsim.world.surface_settings import SurfaceSettings
 
 
 def clutter(rng: np.random.Generator, count: int) -> Scatterers:
-    """Return a patch of wall 3 m ahead, as scatterers of random phase with a constant total cross section."""
+    """A patch of wall 3 m ahead, as scatterers of random phase with one cross section in all."""
     place = np.stack([np.full(count, 3.0), rng.uniform(-3, 3, count), rng.uniform(-1, 1, count)], axis=1)
     return Scatterers.points(place, np.full(count, 12.0 / count), rng.uniform(0, 2 * np.pi, count))
 
@@ -77,9 +77,8 @@ def convergence(axis) -> str:
 
 
 def small_things(axis) -> str:
-    """Objects smaller than 2 cm are a Poisson process of point scatterers on every surface. Cross sections follow a
-    Weibull distribution, P(> s) = exp(-(s / s0)^0.7), and reduce the reflection of the wall by the power they
-    scatter."""
+    """What is smaller than 2 cm is a Poisson process on every surface; larger things are drawn. Cross sections follow
+    Weibull's distribution, P(> s) = exp(-(s / s0)^0.7), and take from the wall what they scatter."""
     wall = SceneObject("wall", shapes.rectangle((3, 0, 1.5), (40, 3), (-1, 0, 0)), material("wood"))
     things = Clutter(Scene("wall", [wall], surface_settings=SurfaceSettings(clutter=1)), np.random.default_rng(0))
     sigma = np.sort(things.near(np.zeros((1, 3)), 50.0).sigma)
@@ -97,7 +96,7 @@ def small_things(axis) -> str:
 
 
 def uneven_walls(axis) -> str:
-    """Along an uneven wall, the specular reflection has the correlation of the phases of the wall's points,
+    """Along an uneven wall, the specular reflection is correlated as the phases of the wall's points are:
     exp(-(2k)^2 (<z z> - <z z'>))."""
     wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (6, 6), (1, 0, 0)), material("plasterboard"))
     steps, level, walls = np.append(np.geomspace(2e-3, 0.3, 16), 10.0), 0.25, 300
@@ -114,9 +113,10 @@ def uneven_walls(axis) -> str:
     axis.set_xscale("log")
     worst = compare(axis, 1e3 * steps[:-1], theory[:-1], found[:-1])
     return (
-        f"Largest error of the correlation: {worst:.3f}, over {walls} walls with a quarter of the default unevenness "
-        f"at 2 m. The mean power of the specular reflection is {np.mean(np.abs(factors) ** 2):.2f} of a flat wall's: "
-        "unevenness causes fading, but does not change the mean power."
+        f"The correlation has an error of {worst:.3f} at most, over {walls} walls of a quarter of the usual "
+        "unevenness, 2 m away. The mean power of the specular reflection is "
+        f"{np.mean(np.abs(factors) ** 2):.2f} of a flat wall's: unevenness makes it fade now and then, but not fainter "
+        "on average."
     )
 
 

@@ -72,7 +72,7 @@ def evaluate(
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`, for SLAM with ``nees`` by
         `radarize.evaluation.nees.pose_nees`. If the run has their truth, ``map``: `map_errors`, ``scans``:
         `scan_errors`, ``velocity``: `velocity_errors`. Values that do not exist are None.
-        Where the run tells it, ``blind``: `radarize.odometry.blindness.BlindSpans`.
+        Spans of the run with unobservable motion, key "blind": `radarize.odometry.observability.UnobservableSpans`.
 
     Raises:
         InputError: not a run, no truth, or no matching poses.

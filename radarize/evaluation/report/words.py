@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from radarize.evaluation.figures import Figure
-from radarize.odometry.blindness import BlindSpans
+from radarize.odometry.observability import UnobservableSpans
 from radarize.pipeline.health import Condition
 
 _TRAJECTORY = (
@@ -89,7 +89,7 @@ def everything(metrics: Mapping[str, object]) -> Iterator[PrintedTable | str]:
     yield PrintedTable(head[:-1], [row[:-1] for row in rows], numbers)
     yield from parts(metrics)
     if "blind" in metrics:
-        sentence, spans = unobservable(BlindSpans.model_validate(metrics["blind"]))
+        sentence, spans = unobservable(UnobservableSpans.model_validate(metrics["blind"]))
         yield sentence
         if spans.rows:
             yield spans
@@ -108,7 +108,7 @@ def health(found: Sequence[Condition]) -> PrintedTable:
     return PrintedTable(("from, s", "to, s", "condition", "advice"), rows, (0, 1))
 
 
-def unobservable(found: BlindSpans) -> tuple[str, PrintedTable]:
+def unobservable(found: UnobservableSpans) -> tuple[str, PrintedTable]:
     """Return a sentence on the share of the path on which motion was unobservable, and a table of these spans."""
     rows = [(f"{s.start_s:.1f}", f"{s.stop_s:.1f}", f"{s.way_m:.2f}", s.why) for s in found.spans]
     share = f"on {found.way_m:.1f} m, {100 * found.share_of_way:.0f} % of the path; poses there are predictions"

@@ -1,7 +1,8 @@
-"""Calibration by walking (`radarize calibrate`): boards with random errors, and what odometry and SLAM make of them.
+"""Calibration from a walk (`radarize calibrate`): boards with random errors, and the ATE of odometry and SLAM with
+them.
 
-A board's errors are put onto the samples of a simulated walk: each channel times a complex factor, and a range bias as
-a frequency shift along the chirp. Walks are through furnished rooms, and their board is perfect.
+Errors are applied to the samples of simulated walks through furnished rooms, whose board is ideal: each channel is
+multiplied by a complex factor, and a range bias is a frequency shift along the chirp.
 """
 
 import argparse
@@ -31,33 +32,33 @@ from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
 
-#: Bounds of a board's errors, each drawn evenly: phases (deg) and gains (dB) of all channels, range bias (m).
+#: Maximum errors of a board, uniformly distributed: phases (deg) and gains (dB) of all channels, range bias (m).
 PHASE, GAIN, BIAS = 30.0, 2.0, 0.2
 PLATFORMS, KINDS = ("handheld", "cart"), "ABCD"
-#: How boards are used.
+#: Conditions that are compared.
 USES = ("perfect", "uncalibrated", "calibrated")
-#: Networks of the methods of choice.
+#: Networks of the default methods.
 NETWORKS = (*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)
 
 
-class Spoiled(Recording):
-    """A recording as a board with channel errors (tx, rx) and a range bias (m) had made it."""
+class Distorted(Recording):
+    """A recording with the channel errors (tx, rx) and the range bias (m) of a board."""
 
     factors, bias = np.ones((1, 1)), 0.0
 
     def adc(self, start: int, stop: int) -> np.ndarray:
-        """Samples with the errors, rounded and saturated anew."""
+        """Return samples with the errors, rounded and saturated again."""
         c = self.config
         times = (np.arange(c.samples) - (c.samples - 1) / 2) / c.sample_rate
         shift = np.exp(4j * np.pi * c.slope * self.bias / SPEED_OF_LIGHT * times)
-        spoil = (self.factors[c.channels][..., None] * shift).astype(np.complex64)
-        iq = np.ascontiguousarray(super().adc(start, stop), np.float32).view(np.complex64)[..., 0] * spoil
+        error = (self.factors[c.channels][..., None] * shift).astype(np.complex64)
+        iq = np.ascontiguousarray(super().adc(start, stop), np.float32).view(np.complex64)[..., 0] * error
         counts = np.clip(np.rint(iq.view(np.float32)), -32768, 32767).astype(np.int16)
         return counts.reshape(*iq.shape, 2)
 
 
 class Trial(NamedTuple):
-    """A walk of a seed, and the folder of its recording; the board's errors are drawn from the same seed."""
+    """A walk with a seed, and the folder of its recording; the board's errors are drawn from the same seed."""
 
     seed: int
     platform: str
@@ -71,7 +72,7 @@ class Trial(NamedTuple):
         return self.folder / f"{self.kind.lower()}-{self.platform}-{self.seed}.h5"
 
     def record(self, _: Report) -> None:
-        """Simulate the walk if it is not there."""
+        """Simulate the walk if its recording does not exist."""
         if not self.path.is_file():
             scene = Scene.of({"building": {"kind": self.kind, "seed": self.seed}}, f"{self.kind} of {self.seed}")
             front_end = FrontEndConfig.of("iwr1843boost", mismatch=None)
@@ -79,46 +80,47 @@ class Trial(NamedTuple):
                 scene, self.path, platform=self.platform, duration=self.duration, seed=self.seed, frontend=front_end
             )
 
-    def spoiled(self) -> Spoiled:
-        """The recording of a board with errors."""
-        rng, recording = np.random.default_rng((self.seed, 56)), Spoiled(self.path)
+    def distorted(self) -> Distorted:
+        """Return the recording with the errors of a board."""
+        rng, recording = np.random.default_rng((self.seed, 56)), Distorted(self.path)
         gain, phase = rng.uniform(-GAIN, GAIN, (3, 4)), np.radians(rng.uniform(-PHASE, PHASE, (3, 4)))
         recording.factors, recording.bias = 10 ** (gain / 20) * np.exp(1j * phase), float(rng.uniform(-BIAS, BIAS))
         return recording
 
     def outcome(self, _: Report) -> dict[str, object]:
-        """Errors of the calibration, and of the trajectories with each use of the board; kept beside the recording."""
+        """Return errors of the calibration, and ATE under each condition; stored beside the recording."""
         kept = self.path.with_suffix(".json")
         if kept.is_file():
             return json.loads(kept.read_text())
-        with self.spoiled() as recording, Recording(self.path) as perfect:
+        with self.distorted() as recording, Recording(self.path) as perfect:
             found = calibrate(recording)
             errors = self._errors(recording, found)
             clips = perfect[:], recording[:], recalibrated(recording[:], found.config)
             for use, clip in zip(USES, clips, strict=True):
-                errors |= dict(zip((f"odometry {use}", f"SLAM {use}"), self._follow(clip), strict=True))
+                errors |= dict(zip((f"odometry {use}", f"SLAM {use}"), self._ate(clip), strict=True))
         errors = {name: value if isinstance(value, str) else float(value) for name, value in errors.items()}
         kept.write_text(json.dumps(errors))
         return errors
 
-    def _errors(self, recording: Spoiled, found: Calibration) -> dict[str, object]:
+    def _errors(self, recording: Distorted, found: Calibration) -> dict[str, object]:
         leftover = (found.config.calibration * recording.factors).ravel()
         gain, phase = 20 * np.log10(np.abs(leftover)), centred(leftover)
         before, bias = centred(recording.factors.ravel()), found.values["range_bias"]
-        claimed = np.sqrt(np.square(found.errors).mean(axis=(0, 1)))
+        estimated = np.sqrt(np.square(found.errors).mean(axis=(0, 1)))
         return {
             "walk": f"{self.kind}, {self.platform}, {self.seed}",
             "phase before deg": np.degrees(before.std()),
-            "phase deg": np.degrees(phase.std()), "claimed phase deg": np.degrees(claimed[1]),
+            "phase deg": np.degrees(phase.std()), "estimated phase deg": np.degrees(estimated[1]),
             "gain dB": gain.std(), "bias before cm": 100 * recording.bias,
-            "bias cm": 100 * ((0.0 if bias.why else bias.value) - recording.bias), "claimed bias cm": 100 * bias.error,
-            "warnings": len(found.warnings), "azimuth scale": found.values["azimuth_scale"].value,
+            "bias cm": 100 * ((0.0 if bias.why else bias.value) - recording.bias),
+            "estimated bias cm": 100 * bias.error, "warnings": len(found.warnings),
+            "azimuth scale": found.values["azimuth_scale"].value,
             "yaw deg": np.degrees(found.values["yaw"].value), "lever arm m": found.values["lever_arm"].value,
             "height m": found.values["height"].value,
         }  # fmt: skip
 
-    def _follow(self, frames: Clip) -> tuple[float, float]:
-        """Mean ATE of odometry and of SLAM by the methods of choice, m."""
+    def _ate(self, frames: Clip) -> tuple[float, float]:
+        """Return the mean ATE of odometry and of SLAM by the default methods, m."""
         config: RadarConfig = frames.config
         inputs = Inputs(config, self.configuration)
         pipeline, tracks = make_pipeline(inputs, **BEST), []
@@ -134,7 +136,7 @@ class Trial(NamedTuple):
 
 
 def summary(rows: Sequence[dict]) -> dict[str, object]:
-    """RMS of the errors and means of the trajectories' over all walks."""
+    """Return RMS errors of the calibration, and mean ATE over all walks."""
     last: dict[str, object] = {"walk": f"all {len(rows)}"}
     for name in list(rows[0])[1:]:
         values = np.array([row[name] for row in rows], float)
@@ -142,7 +144,7 @@ def summary(rows: Sequence[dict]) -> dict[str, object]:
             last[name] = values.mean()
         elif name == "warnings":
             last[name] = int(values.sum())
-        elif "claimed" in name or name.startswith(("phase", "gain", "bias")):
+        elif name.startswith("estimated") or name.startswith(("phase", "gain", "bias")):
             last[name] = np.sqrt(np.mean(values**2))
         else:
             last[name] = np.nanmean(values) if np.isfinite(values).any() else None
@@ -150,12 +152,12 @@ def summary(rows: Sequence[dict]) -> dict[str, object]:
 
 
 @script(
-    "Calibration by walking",
-    folder=(Path("calibration-walks"), "of recordings, made if they are not there, and of what was found of each"),
-    walks=(12, "how many; their seeds count from --seed"),
-    seed=(801, "of the first walk; 701 to 708 are those that settings were chosen on"),
-    duration=(20.0, "of a walk, s"),
-    workers=(2, "processes"),
+    "Calibration from a walk",
+    folder=(Path("calibration-walks"), "folder of the recordings, which are made if missing, and of their results"),
+    walks=(12, "number of walks; their seeds count from --seed"),
+    seed=(801, "seed of the first walk; 701 to 708 are the tuning set"),
+    duration=(20.0, "duration of a walk, s"),
+    workers=(2, "number of processes"),
 )
 def main(options: argparse.Namespace) -> Page:
     trials = [
@@ -176,14 +178,13 @@ def main(options: argparse.Namespace) -> Page:
         data=Data.of("simulated walks", [trial.path for trial in trials], options.seed),
         networks=tuple(UsedNetwork.of(Weights().of(kind)) for kind in NETWORKS),
         notes=[
-            "Phases and gains: standard deviation over the 12 channels of what is left after the calibration, slopes "
-            f"along the array included; phases were drawn within {PHASE:g} deg, gains within {GAIN:g} dB and range "
-            f"biases within {BIAS:g} m. Claimed: standard errors. The last line: RMS of errors, mean of the others.",
-            "Odometry and SLAM: mean ATE, m, by the methods of choice, with the perfect board, with the errors, and "
-            "with the errors and the calibration that came from the same walk. Over the perfect board's: odometry "
+            "phase, gain: standard deviation over the 12 channels after calibration, including slopes along the array; "
+            f"errors are uniform within {PHASE:g} deg, {GAIN:g} dB and a range bias of {BIAS:g} m. estimated: standard "
+            "errors estimated by the calibration. Last row: RMS of errors, means of the other columns.",
+            "odometry, SLAM: mean ATE, m, by the default methods, with the ideal board, with errors, and with errors "
+            "and the calibration from the same walk. Relative to the ideal board: odometry "
             f"{odometry['uncalibrated']:.2f} x uncalibrated, {odometry['calibrated']:.2f} x calibrated; SLAM "
             f"{ratio['uncalibrated']:.2f} x and {ratio['calibrated']:.2f} x.",
-            "Carriers: the cart's sensor sits 0.20 m ahead of its axle, 0.95 m high, without yaw; the hand's is 1.2 m "
-            "high.",
+            "Mounting: on the cart 0.20 m in front of the axle, 0.95 m high, without yaw; handheld 1.2 m high.",
         ],
     )

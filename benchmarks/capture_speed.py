@@ -1,4 +1,4 @@
-"""`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
+"""Capture speed: `radarize capture` with `radarsim emulate`, in separate processes: lost frames and processor load."""
 
 import argparse
 import os
@@ -21,18 +21,18 @@ from radarize.radar.presets import load_config
 from radarsim.emulator.disturbance import Disturbance
 from tests.virtual import emulator
 
-LOOP = 64  # frames played again and again
+LOOP = 64  # frames that are repeated
 NOISE = 40  # counts, RMS: about an IWR1843's at 30 dB of gain in a room
 
 
 def used(process: subprocess.Popen) -> float:
-    """Processor time of a process and its children, those that have ended included, s."""
+    """Return the processor time of a process and its children, including those that have ended, s."""
     root = psutil.Process(process.pid)
     return sum(sum(each.cpu_times()[:4]) for each in (root, *root.children(recursive=True)))
 
 
 def chirps_that_arrive(config: RadarConfig, frames: int, network: Disturbance) -> Bool[np.ndarray, "frame loop tx"]:
-    """Chirps (physical order) of which a network loses no packet."""
+    """Return whether each chirp (transmitters in physical order) arrives without a lost packet."""
     count = -(-frames * config.frame_bytes // MAX_PAYLOAD)
     sent = (number.to_bytes(8, "little") for number in range(count))
     through = [packet for each in sent for packet in network(each)] + list(network.rest())
@@ -49,7 +49,8 @@ def chirps_that_arrive(config: RadarConfig, frames: int, network: Disturbance) -
 def compared(
     path: Path, played: Int16[np.ndarray, "frame loop tx rx sample 2"], arriving: Bool[np.ndarray, "frame loop tx"]
 ) -> tuple[Losses, int, int, str]:
-    """A capture of frames that were played again and again: losses, chirps mismarked, chirps wrong, warnings."""
+    """Compare a capture with the repeated frames: losses, chirps with a wrong mark, chirps with a wrong sample, and
+    warnings."""
     wrong, mismarked = 0, 0
     with Recording(path) as recording:
         losses = Losses(recording.config.frame_period)
@@ -67,7 +68,7 @@ def compared(
 def run(
     config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, shares: dict[str, float]
 ) -> tuple[dict[str, object], str]:
-    """One capture: a row of the table, and what the recording warns of."""
+    """Run one capture: a row of the table, and warnings of the recording."""
     options = [word for name, share in shares.items() for word in (f"--{name}", str(share))]
     rng = np.random.default_rng(seed)
     played = rng.normal(0, NOISE, (LOOP, *config.frame_shape)).round().astype(np.int16)
@@ -107,19 +108,20 @@ def run(
 
 @script(
     "Capture at the virtual radar",
-    seconds=(300.0, "length of the capture"),
+    seconds=(300.0, "duration of the capture, s"),
     config=("radarize", "preset or .cfg"),
-    bad_seconds=(60.0, "length of another one over a bad network; 0: none"),
-    seed=(0, "of noise and network"),
+    bad_seconds=(60.0, "duration of a second capture over a network with losses, s; 0: none"),
+    seed=(0, "seed of noise and network"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """The table."""
+    """Measure both captures."""
     config, _ = load_config(options.config)
     rows: list[dict[str, object]] = []
     notes = [
-        f"Noise of {NOISE} counts RMS, {LOOP} frames played again and again; every sample compared with the one sent, "
-        "and every chirp's mark with what the network's seed says was lost.",
-        "Frames are not written if disk or processor are too slow for them; the emulator is late if it gets no time.",
+        f"Noise of {NOISE} counts RMS, {LOOP} frames repeated; every sample is compared with the one sent, and the "
+        "mark of every chirp with the losses of the simulated network.",
+        "Frames are not written if disk or processor are too slow; the emulator is late if it gets too little "
+        "processor time.",
         surroundings(),
     ]
     bad = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}

@@ -1,4 +1,4 @@
-"""Rates of `radarize check`: faults put into simulated walks (`benchmarks.faults`), and walks without any.
+"""Detection rates of `radarize check` on simulated walks with faults (`benchmarks.faults`), and false alarms.
 
 python -m benchmarks.check --folder check
 """
@@ -29,12 +29,12 @@ from radarize.radar.presets import PRESETS
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
 
-#: Hz: start of the sweep of 60 GHz boards; s of a walk.
+#: Start frequency of 60 GHz boards, Hz; duration of a walk, s.
 _SIXTY, _DURATION = 60e9, 10.0
 
 
 class Trial(NamedTuple):
-    """A walk."""
+    """A simulated walk, with the folder of its recording."""
 
     seed: int
     building: str
@@ -47,7 +47,7 @@ class Trial(NamedTuple):
         return self.folder / f"{self.seed}.h5"
 
     def record(self, _: Report) -> None:
-        """Make the recording if it is not there."""
+        """Simulate the recording if it does not exist."""
         if self.path.is_file():
             return
         radar = PRESETS["radarize"]
@@ -59,7 +59,7 @@ class Trial(NamedTuple):
         )
 
     def outcomes(self, _: Report, names: Sequence[str]) -> dict[str, "Outcome"]:
-        """Of the walk with each of the faults; kept in a file, so that the same command goes on."""
+        """Check the walk with each of the faults; results are stored in a file, so that the same command continues."""
         kept = self.folder / f"{self.seed}-{commit(Path(__file__)).split()[0]}.json"
         known = json.loads(kept.read_text()) if kept.is_file() else {}
         found = {name: Outcome(tuple(kinds), *rest) for name, (kinds, *rest) in known.items()}
@@ -88,7 +88,7 @@ class Trial(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Kinds that were found, whether the fault was said not to be observable, and s that it took."""
+    """Kinds of the findings, whether the check reports the fault as not observable, and run time, s."""
 
     kinds: tuple[str, ...]
     unseen: bool
@@ -96,14 +96,14 @@ class Outcome(NamedTuple):
 
 
 def trials(about: dict, boards: Sequence[str], folder: Path) -> Iterator[Trial]:
-    """Buildings, platforms and boards by turns; every other board is the first one."""
+    """Yield walks with alternating buildings, platforms and boards; every second board is the first one."""
     for k in range(about["count"]):
         board = boards[(k // 2 + k // 4) % len(boards)] if k % 2 else boards[0]
         yield Trial(about["first"] + k, "ABCD"[k % 4], ("handheld", "cart", "robot")[k % 3], board, folder)
 
 
 def row(name: str, found: Sequence[Outcome]) -> dict[str, object]:
-    """Rates of a fault, of those walks that show it."""
+    """Return the detection rates of a fault over the walks in which it is observable."""
     kind = FAULTS[name].kind
     others = Counter(each for outcome in found for each in outcome.kinds if each != kind)
     unseen = sum(outcome.unseen and not outcome.kinds for outcome in found) if kind else 0
@@ -111,18 +111,18 @@ def row(name: str, found: Sequence[Outcome]) -> dict[str, object]:
     named = sum(kind in outcome.kinds for outcome in found)
     return {
         "fault": name,
-        "named": kind or NONE,
+        "kind": kind or NONE,
         "walks": len(found),
-        "said not observable": unseen,
+        "not observable": unseen,
         "found": f"{sum(bool(outcome.kinds) for outcome in found)}/{shown}",
-        "named rightly": f"{named}/{shown}" if kind else NONE,
-        "named rightly %": 100 * named / shown if kind and shown else NONE,
-        "other kinds named": ", ".join(f"{each} {count}" for each, count in others.most_common()) or NONE,
+        "correct kind": f"{named}/{shown}" if kind else NONE,
+        "correct kind %": 100 * named / shown if kind and shown else NONE,
+        "other kinds": ", ".join(f"{each} {count}" for each, count in others.most_common()) or NONE,
     }
 
 
 def real() -> Iterator[tuple[str, Check]]:
-    """Public captures of radars at rest, one frame each."""
+    """Check public captures of radars at rest, with one frame each."""
     given: dict[str, dict] = {
         "iwr1843-pcap/test_one_frame.pcap": {"samples": 256, "loops": 16, "rx": 1},
         "iwr6843-studio": {},
@@ -138,14 +138,14 @@ def real() -> Iterator[tuple[str, Check]]:
 
 @script(
     "Faults found by radarize check",
-    folder=(Path("build/check"), "of the recordings, which are made if they are not there"),
-    set=("test", "tuning, or test"),
-    few=(0, "walks; all if 0"),
-    only=("", "parts of names of faults, comma-separated; all if none"),
-    workers=(2, "processes"),
+    folder=(Path("build/check"), "folder of the recordings, which are made if missing"),
+    set=("test", "tuning or test"),
+    few=(0, "number of walks; all if 0"),
+    only=("", "parts of names of faults, comma-separated; all if empty"),
+    workers=(2, "number of processes"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """All faults in all walks."""
+    """Check all faults in all walks."""
     about = read_beside(__file__)
     walks = list(trials(about[options.set], about["boards"], options.folder))[: options.few or None]
     names = [name for name in FAULTS if any(word in name for word in options.only.split(","))]
@@ -157,7 +157,7 @@ def main(options: argparse.Namespace) -> Page:
     rows = [row(name, outcomes[name]) for name in names if outcomes[name]]
     for name, checked in real():
         kinds = tuple(each.kind for each in checked.findings)
-        about_it = {"fault": f"real: {name}", "walks": 1, "other kinds named": ", ".join(kinds) or NONE}
+        about_it = {"fault": f"real: {name}", "walks": 1, "other kinds": ", ".join(kinds) or NONE}
         rows.append({**dict.fromkeys(rows[0], NONE), **about_it})
     seconds = np.array([each["none"].seconds for each in found if "none" in each])
     boards = Counter(walk.board for walk in walks)
@@ -165,15 +165,15 @@ def main(options: argparse.Namespace) -> Page:
         rows,
         data=Data.of(f"walks of benchmarks/check.yaml, {options.set}", [walk.path for walk in walks]),
         notes=[
-            f"{len(walks)} walks of {_DURATION:.0f} s, handheld, by cart and by robot, through furnished buildings of "
-            f"four kinds; boards: {', '.join(f'{name} {count}' for name, count in boards.most_common())}. Each fault "
-            "is put into samples, stamps, configuration or truth of each walk whose board can have it.",
-            "Found: anything was found; named rightly: the fault's own kind was. Both are of walks that show the "
-            "fault: where the check said of itself that it cannot be observed, and found nothing else, a walk does not "
-            "count. Rows that begin with none have no fault: what is found there is a false alarm.",
-            "Real captures have one frame each of a radar at rest, so that no motion is what is right to find.",
-            f"A check of a walk without faults takes {np.median(seconds):.2f} s (median; samples in memory, "
-            f"one thread, {options.workers} at once).",
+            f"{len(walks)} walks of {_DURATION:.0f} s (handheld, cart, robot) through furnished buildings of four "
+            f"kinds; boards: {', '.join(f'{name} {count}' for name, count in boards.most_common())}. Each fault is "
+            "simulated in samples, time stamps, configuration or truth of each walk whose board can have it.",
+            "found: walks with any finding; correct kind: walks with a finding of the fault's kind. Both are shares of "
+            "the walks in which the fault is observable: walks without findings for which the check reports the fault "
+            "as not observable are left out. Rows that begin with none have no fault: their findings are false alarms.",
+            "Real captures have one frame of a radar at rest, for which `no motion` is the correct finding.",
+            f"Run time of a check of a walk without faults: {np.median(seconds):.2f} s (median; samples in memory, "
+            f"one thread, {options.workers} processes).",
             surroundings(),
         ],
     )

@@ -1,4 +1,4 @@
-"""Hard conditions (`benchmarks.hardships`): the same walks plain, and under each."""
+"""Hard conditions (`benchmarks.hardships`): errors on the same walks without and with each condition."""
 
 import argparse
 from collections import Counter
@@ -37,7 +37,7 @@ WALKS = Path(__file__).with_suffix(".yaml")
 
 
 class Trial(NamedTuple):
-    """A walk of `WALKS` under a condition, and the folder of its recording; its methods are jobs."""
+    """A walk of `WALKS` under a condition, with the folder of its recording; methods are jobs."""
 
     walk: dict
     condition: str
@@ -45,12 +45,12 @@ class Trial(NamedTuple):
 
     @property
     def recording(self) -> Path:
-        """That of the plain walk where samples are hurt afterwards."""
+        """Path of the recording: that of the plain walk if the condition modifies samples only."""
         name = self.condition if CONDITIONS[self.condition].scenario else "plain"
         return self.folder / f"{self.walk['seed']}-{name.replace(' ', '-').replace('/', '-')}.h5"
 
     def record(self, _: Report) -> None:
-        """Make the recording if it is not there."""
+        """Simulate the recording if it does not exist."""
         if self.recording.is_file():
             return
         seed, building = self.walk["seed"], self.walk["building"]
@@ -60,7 +60,7 @@ class Trial(NamedTuple):
         record(Batches.of(harder(plain) if harder else plain), self.recording)
 
     def outcome(self, _: Report) -> "Outcome":
-        """Of the whole pipeline."""
+        """Run the whole pipeline and compare it with the truth."""
         hurt, rng, tracks = CONDITIONS[self.condition].hurt, np.random.default_rng(0), []
         with Recording(self.recording) as recording:
             inputs = Inputs(recording.config)
@@ -82,37 +82,38 @@ class Trial(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Errors of both trajectories, standard deviation of the last yaw that odometry claims (rad), and what was said."""
+    """Errors of both trajectories, estimated standard deviation of the last yaw of odometry (rad), and kinds of
+    conditions reported by the health of odometry."""
 
     odometry: TrajectoryErrors
     slam: TrajectoryErrors
-    claimed: float
-    said: set[str]
+    yaw_deviation: float
+    reported: set[str]
 
 
 def row(name: str, found: Sequence[Outcome], plain: Sequence[Outcome]) -> dict[str, object]:
-    """Errors over walks, beside those of the plain walks."""
+    """Return a row of errors over walks under a condition, relative to the plain walks."""
     odometry = pd.Series([each.odometry.position.mean for each in found])
     slam, before = (pd.Series([each.slam.position.mean for each in outcomes]) for outcomes in (found, plain))
-    said = Counter(kind for each in found for kind in each.said)
+    reported = Counter(kind for each in found for kind in each.reported)
     return {
         "condition": name,
         "odometry m": with_error(odometry),
         "SLAM m": with_error(slam),
         "worst SLAM m": slam.max(),
         "times the plain walks'": slam.mean() / before.mean(),
-        "yaw off by at most deg": np.degrees(max(each.odometry.rotation.max for each in found)),
-        "claimed at the end deg": np.degrees(np.mean([each.claimed for each in found])),
-        f"health, in so many of {len(found)}": ", ".join(f"{k} {n}" for k, n in sorted(said.items())) or NONE,
+        "max yaw error deg": np.degrees(max(each.odometry.rotation.max for each in found)),
+        "estimated std. of last yaw deg": np.degrees(np.mean([each.yaw_deviation for each in found])),
+        f"health, number of {len(found)} walks": ", ".join(f"{k} {n}" for k, n in sorted(reported.items())) or NONE,
     }
 
 
 @script(
     "Hard conditions",
-    folder=(Path("conditions"), "of the recordings, which are made if they are not there"),
-    only=("", "conditions, comma-separated; all if none"),
-    seconds=(30.0, "of each walk"),
-    workers=(2, "processes"),
+    folder=(Path("conditions"), "folder of the recordings, which are made if missing"),
+    only=("", "conditions, comma-separated; all if empty"),
+    seconds=(30.0, "duration of each walk, s"),
+    workers=(2, "number of processes"),
 )
 def main(options: argparse.Namespace) -> Page:
     walks = [walk | {"duration": options.seconds} for walk in yaml.safe_load(WALKS.read_text())]
@@ -130,11 +131,11 @@ def main(options: argparse.Namespace) -> Page:
         data=Data.of("walks of benchmarks/conditions.yaml and their hard versions", sorted(map(Path, recordings))),
         networks=Networks().used(Pair(**BEST).networks),
         notes=[
-            f"Mean errors after alignment, of {len(walks)} walks, +- standard error; yaw: the largest error of "
-            "odometry after alignment, and the standard deviation of the last yaw that it claims, given the first, "
-            "mean over walks. Health: kinds of conditions that were told, and in how many of the walks. Sidestepping, "
-            "corridor and hall are other walks in other places, the same for each.",
-            "To reach: at most three times the plain walks' SLAM, but where nothing tells the motion; there health "
-            "says so.",
+            f"odometry, SLAM: ATE, mean over {len(walks)} walks +- standard error. Yaw of odometry: largest error "
+            "after alignment, and the estimated standard deviation of the last yaw given the first, mean over walks. "
+            "health: reported kinds of conditions, and the number of walks with them. Sidestepping, corridor and hall "
+            "are walks in other places.",
+            "Target: at most three times the SLAM error of the plain walks, except where motion is unobservable, which "
+            "health must report.",
         ],
     )

@@ -1,6 +1,6 @@
-"""What people's files and surroundings do to a recording: each kind of damage is made, read, and counted.
+"""Damaged files and faulty environments: results of commands for each kind of damage.
 
-The damaged files are made from one simulated walk. `_BEFORE` holds what the same script found at commit 5718bfa.
+The damaged files are made from one simulated walk. `_BEFORE` has the results of this script at commit 5718bfa.
 """
 
 import argparse
@@ -26,10 +26,10 @@ from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000 import Packet, encode
 from radarsim.cli import app as radarsim
 
-#: The walk, made once.
+#: Recording of the walk, simulated once.
 WALK = Path("build/damaged/walk.h5")
 SIMULATE = ["office", "--platform", "cart", "--duration", "7", "--seed", "1"]
-#: Letters of a sentence that the table shows.
+#: Maximum length of an output in the table, characters.
 _SHOWN = 220
 _BEFORE = {
     "64 bytes of a chunk zeroed: export": "exit 2, nothing exported",
@@ -71,7 +71,7 @@ CASES: dict[str, tuple[int, Case]] = {}
 
 
 def case(kind: int, name: str, *arguments: object) -> Callable:
-    """Enter a case: a function that makes files in a folder and gives the command that reads them."""
+    """Register a case: a function that makes files in a folder and returns the command that reads them."""
 
     def enter(make: Callable) -> Callable:
         CASES[name] = kind, lambda folder: make(folder, *arguments)
@@ -156,7 +156,7 @@ def _shorter(folder: Path, name: str) -> list[str]:
 
 # --- network captures -------------------------------------------------------------------------------------------------
 def _sent(start: int, stop: int, source: str = "192.168.33.180", port: int = 4098) -> Iterator[bytes]:
-    """Ethernet frames of a board's packets for some frames of the walk."""
+    """Yield Ethernet frames with a board's packets of some frames of the walk."""
     with Recording(WALK) as recording:
         stream = encode(recording.adc(start, stop), recording.config).tobytes()
     for number, at in enumerate(range(0, len(stream), 1456)):
@@ -260,9 +260,9 @@ def _no_utf8(folder: Path) -> list[str]:
     return ["report", str(_walk(folder, "walk \udcff.h5"))]
 
 
-# --- what came of them ------------------------------------------------------------------------------------------------
+# --- results ----------------------------------------------------------------------------------------------------------
 def invoked(words: list[str]) -> tuple[int, str]:
-    """Exit code and words of a command; in a process of its own where a name is no UTF-8, as a terminal prints it."""
+    """Return exit code and output of a command; it runs in a separate process if a name is not valid UTF-8."""
     if any("\udcff" in word for word in words):
         command = [sys.executable, "-m", "radarize.cli", *words]
         ended = subprocess.run(command, capture_output=True, text=True, errors="backslashreplace")
@@ -275,10 +275,10 @@ def invoked(words: list[str]) -> tuple[int, str]:
 
 
 def outcome(name: str, folder: Path) -> dict[str, object]:
-    """A row of the table: what a command did with a case's files."""
+    """Return a row of the table: result of the command on the files of a case."""
     kind, make = CASES[name]
     words = make(folder)
-    code, told = invoked(words)
+    code, output = invoked(words)
     marks = (
         "damaged",
         "cannot be unpacked",
@@ -290,9 +290,8 @@ def outcome(name: str, folder: Path) -> dict[str, object]:
         "floor",
         "moved",
     )
-    lines = [line for line in told.splitlines() if any(mark in line for mark in marks)] or told.strip().splitlines()[
-        -1:
-    ]
+    lines = [line for line in output.splitlines() if any(mark in line for mark in marks)]
+    lines = lines or output.strip().splitlines()[-1:]
     frames = lost = None
     for path in sorted(folder.glob("*.h5")):
         try:
@@ -315,9 +314,9 @@ def outcome(name: str, folder: Path) -> dict[str, object]:
     }
 
 
-@script("Damaged files, and what else happens to people", cases=(0, "so many alone, the first ones; 0: all"))
+@script("Damaged files and faulty environments", cases=(0, "number of cases, from the first; 0: all"))
 def main(options: argparse.Namespace) -> Page:
-    """The table."""
+    """Run all cases."""
     warnings.simplefilter("ignore")
     if not WALK.exists():
         WALK.parent.mkdir(parents=True, exist_ok=True)
@@ -330,12 +329,12 @@ def main(options: argparse.Namespace) -> Page:
         rows,
         data=Data("one simulated walk of 210 frames (office, cart)", (), 1),
         notes=[
-            "Kinds: 1 a frame that cannot be unpacked; 2 a `.part`, and stamps; 3 several captures in one; 4 bytes "
-            "missing in raw words; 6 headers and transmitters; 7 surroundings. Kind 5, what is wrong without a "
-            "word, is the business of `radarize check`.",
-            "Before: at commit 5718bfa, by this script. Frames: of all recordings that are there afterwards. 210 went "
-            "into each case; but 110, 100, 100, 50 and 50 into the network captures, 60 into --tx 1, 100 into bags.",
-            "A deleted working folder, full shared memory and an early Ctrl-C are tried in "
+            "kind: 1 a frame that cannot be unpacked; 2 a `.part`, and time stamps; 3 several captures in one; 4 bytes "
+            "missing in raw samples; 6 headers and transmitters; 7 environment. Faults without an error message are "
+            "found by `radarize check`.",
+            "before: result of this script at commit 5718bfa. frames: in all recordings after the command. Each case "
+            "has 210 frames, except 110, 100, 100, 50 and 50 in the network captures, 60 in --tx 1, 100 in bags.",
+            "A deleted working folder, full shared memory and an early Ctrl-C are tested in "
             "`tests/io/test_surroundings.py`.",
             surroundings(),
         ],

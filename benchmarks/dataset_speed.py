@@ -1,6 +1,5 @@
-"""Data sets end to end: what sensors and writing cost beside the simulation, how furnished buildings compare with bare
-ones, how workers share the cores, and what the paper's data set would take on this machine, from a sample of one in ten
-of its recordings."""
+"""Speed of data sets: run time of sensors and writing relative to the simulation, furnished and bare buildings,
+processes and threads, and the projected time for the paper's data set, from a sample of its recordings."""
 
 import argparse
 import os
@@ -33,7 +32,7 @@ BARE = {"clutter": 0, "unevenness": 0}
 
 
 def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
-    """Seconds per frame of simulation, truth and writing, in one loop; medians over batches."""
+    """Measure the run time of simulation, truth and writing, s per frame; medians over batches."""
     scene = Scene.of({"building": {"kind": "A", "seed": 1}}, "A")
     motion = Walk("handheld", frames * CONFIG.frame_period + 1).through(scene, seed)
     scenario = Scenario(scene, motion, CONFIG, seed=seed)
@@ -54,7 +53,8 @@ def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
 
 
 def furnished_and_bare(frames: int, seed: int) -> dict[str, float]:
-    """Seconds per frame of simulation along the same walks through buildings, furnished and bare, in turns; medians."""
+    """Measure the run time of simulation on the same walks through furnished and bare buildings, s per frame;
+    medians."""
     share = {}
     for kind in "ABCD":
         building, scenarios = {"building": {"kind": kind, "seed": 1}}, {}
@@ -72,15 +72,15 @@ def furnished_and_bare(frames: int, seed: int) -> dict[str, float]:
 
 @dataclass
 class Run:
-    """What a run of tasks took.
+    """Resources of a run of tasks.
 
     Attributes:
-        wall: s, processes starting included.
-        frame: s per frame of one worker.
-        overhead: s per recording of one worker: scene, tour, first frames, and its share of the start.
-        size: bytes per frame on disk.
-        memory: of the largest worker at its peak, MB.
-        frames: made.
+        wall: wall time including the start of processes, s.
+        frame: time per frame of one worker, s.
+        overhead: time per recording of one worker for scene, tour, first frames, and its share of the start, s.
+        size: size on disk per frame, bytes.
+        memory: peak memory of the largest worker, MB.
+        frames: number of frames.
     """
 
     wall: float
@@ -92,7 +92,7 @@ class Run:
 
 
 def run(tasks: list[Task], folder: Path, workers: int) -> Run:
-    """Make recordings on local processes."""
+    """Make recordings on local processes, and measure the resources."""
     folder.mkdir()
     begin, first, last, memory = time.perf_counter(), {}, {}, 0.0
     for news in perform(making(tasks, folder), workers):
@@ -112,24 +112,24 @@ def run(tasks: list[Task], folder: Path, workers: int) -> Run:
 
 
 def shortened(tasks: Iterable[Task], seconds: float, storage: str) -> list[Task]:
-    """The same recordings, but shorter."""
+    """Return the tasks of the same recordings with a shorter duration."""
     shorter = {"duration": seconds, "frames": CONFIG.frames_within(seconds)}
     return [replace(task, storage=storage, **(shorter if seconds < task.duration else {})) for task in tasks]
 
 
 def row(what: str, seconds: float) -> dict[str, object]:
-    """A row of the table, from seconds a frame; its other columns are empty."""
+    """Return a row of the table from the time per frame, s; its other columns are empty."""
     pace = {"what": what, "ms per frame": 1e3 * seconds, "frames/s": 1 / seconds}
     return pace | dict.fromkeys(("of simulation", "kB per frame", "MB per worker"), "")
 
 
 @script(
     "Data sets: speed and size",
-    every=(10, f"one in so many recordings of {BIG} is made"),
-    seconds=(60.0, "of each at most"),
-    frames=(240, "of the comparisons with the simulation alone and with bare buildings"),
-    few=(4, "recordings by which workers and storage are compared"),
-    seed=(0, "of the walks in those comparisons"),
+    every=(10, f"every N-th recording of {BIG} is made"),
+    seconds=(60.0, "maximum duration of each, s"),
+    frames=(240, "frames of the comparisons of single steps and of bare buildings"),
+    few=(4, "recordings of the comparisons of workers and storage"),
+    seed=(0, "seed of the walks in the comparisons"),
 )
 def main(options: argparse.Namespace) -> Page:
     cores = len(os.sched_getaffinity(0))
@@ -164,12 +164,12 @@ def main(options: argparse.Namespace) -> Page:
         rows,
         data=data,
         notes=[
-            f"All truth sensors and writing cost {extra:.2f} of the simulation (target: at most 0.33).",
+            f"Run time of all truth sensors and writing: {extra:.2f} of the simulation (target: at most 0.33).",
             f"{BIG} on this machine, projected from {len(sample)} of its {len(tasks)} recordings, "
             f"{measured.frames / len(sample) * CONFIG.frame_period:.0f} s each ({measured.frames} of {total} frames, "
             f"made in {measured.wall / 60:.1f} minutes): {hours:.1f} hours, {total * measured.size / 1e9:.1f} GB raw "
             f"with all sensors; heat maps with all sensors {total * heat.size / 1e9:.1f} GB.",
-            f"Beyond its frames a recording takes {measured.overhead:.1f} s: scene, tour, first frames.",
-            "Rates count from a recording's first batch to its last. Kilobytes are of whole files, truth included.",
+            f"Overhead per recording: {measured.overhead:.1f} s for scene, tour and first frames.",
+            "Rates are from the first to the last batch of a recording. kB per frame: size of the file with its truth.",
         ],
     )

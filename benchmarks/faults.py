@@ -1,4 +1,4 @@
-"""Faults that are put into a whole recording in memory, and the kinds by which `radarize check` should name them."""
+"""Faults that are simulated in a recording in memory, and the kinds of finding expected from `radarize check`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,12 +23,12 @@ class Walk:
     """A recording in memory.
 
     Attributes:
-        config: of the radar.
-        adc: I/Q.
-        times: starts of frames, s.
-        valid: False where a chirp was lost.
-        truth: true poses; None without.
-        imu: None without.
+        config: radar configuration.
+        adc: I/Q samples.
+        times: start of each frame, s.
+        valid: False for lost chirps.
+        truth: true poses, or None.
+        imu: IMU, or None.
     """
 
     config: RadarConfig
@@ -40,11 +40,11 @@ class Walk:
 
     @property
     def evidence(self) -> Evidence:
-        """For a check."""
+        """Input of the check."""
         return Evidence(self.config, self.times, self.valid, lambda a, b: self.adc[a:b], self.truth, self.imu)
 
     def of(self, frames: np.ndarray, stamped: bool = True) -> "Walk":
-        """Other frames of it, with their stamps or with those of as many first frames."""
+        """Select frames, with their own time stamps or with those of the first frames."""
         times = self.times[frames] if stamped else self.times[: len(frames)]
         return replace(self, adc=self.adc[frames], times=times, valid=self.valid[frames])
 
@@ -56,8 +56,8 @@ class Fault(NamedTuple):
     """A fault.
 
     Attributes:
-        kind: how it should be named; empty: it is none.
-        harm: makes it of a whole walk; None where a radar cannot have it.
+        kind: expected kind of finding; empty: not a fault.
+        harm: applies the fault to a walk; returns None if the radar cannot have it.
     """
 
     kind: str
@@ -84,7 +84,7 @@ def plain(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def hurt(harm: Callable) -> Harm:
-    """A hardship, which is no fault."""
+    """Convert a function of `benchmarks.hardships`, which may not be a fault, to a function of walks."""
 
     def made(walk: Walk, rng: np.random.Generator) -> Walk:
         samples = harm(hardships.Samples(walk.adc, walk.times, walk.valid), rng)
@@ -93,7 +93,7 @@ def hurt(harm: Callable) -> Harm:
     return made
 
 
-# --- words ------------------------------------------------------------------------------------------------------------
+# --- sample format ----------------------------------------------------------------------------------------------------
 def exchanged_iq(walk: Walk, rng: np.random.Generator) -> Walk:
     return replace(walk, adc=np.ascontiguousarray(walk.adc[..., ::-1]))
 
@@ -116,18 +116,18 @@ def _fired(walk: Walk) -> np.ndarray:
 
 
 def interleaved(walk: Walk, rng: np.random.Generator) -> Walk:
-    """Four lanes, read as two."""
+    """Samples of four LVDS lanes, decoded as two."""
     words = np.ascontiguousarray(_fired(walk).transpose(0, 1, 2, 4, 5, 3)).reshape(-1)
     return replace(walk, adc=decode(words, walk.config))
 
 
 def alternating_iq(walk: Walk, rng: np.random.Generator) -> Walk:
-    """I0 Q0 I1 Q1, read in pairs."""
+    """Samples in the order I0 Q0 I1 Q1, decoded as I0 I1 Q0 Q1."""
     return replace(walk, adc=decode(np.ascontiguousarray(_fired(walk)).reshape(-1), walk.config))
 
 
 def loops_inside(walk: Walk, rng: np.random.Generator) -> Walk:
-    """All chirps of a transmitter before those of the next, read loop by loop."""
+    """All chirps of a transmitter before those of the next, decoded loop by loop."""
     fired = walk.adc[:, :, [walk.config.tx.index(t) for t in walk.config.tx_order]].swapaxes(1, 2)
     chirps = np.ascontiguousarray(fired).reshape(walk.adc.shape)
     return replace(walk, adc=np.ascontiguousarray(chirps[:, :, list(walk.config.slot)]))
@@ -135,7 +135,7 @@ def loops_inside(walk: Walk, rng: np.random.Generator) -> Walk:
 
 # --- antennas ---------------------------------------------------------------------------------------------------------
 def fired_otherwise(walk: Walk, rng: np.random.Generator) -> Walk:
-    """Read as if transmitters had fired in the order of their numbers."""
+    """Samples decoded as if transmitters fired in the order of their numbers."""
     order = [walk.config.tx.index(t) for t in walk.config.tx_order]
     config = walk.config.model_copy(update={"tx_order": walk.config.tx})
     return replace(walk, adc=np.ascontiguousarray(walk.adc[:, :, order]), config=config)
@@ -152,7 +152,7 @@ def receivers(*order: int) -> Harm:
 
 
 def other_board(walk: Walk, rng: np.random.Generator) -> Walk | None:
-    """Another one of the boards with an IWR6843 is configured."""
+    """Another board with an IWR6843 is configured."""
     sixty = [name for name, board in BOARDS.items() if board.chip == "iwr6843"]
     if str(walk.config.board) not in sixty:
         return None
@@ -167,22 +167,22 @@ def _negated(config: RadarConfig, left: int, up: int) -> RadarConfig:
 
 
 def mirrored(walk: Walk, rng: np.random.Generator) -> Walk:
-    """A board's file with left and right exchanged; an IMU and true poses know better."""
+    """A board file with left and right exchanged; IMU and true poses are correct."""
     return replace(walk, config=_negated(walk.config, -1, 1))
 
 
 def elevation_mirrored(walk: Walk, rng: np.random.Generator) -> Walk:
-    """A board's file with up and down exchanged."""
+    """A board file with up and down exchanged."""
     return replace(walk, config=_negated(walk.config, 1, -1))
 
 
-def mirrored_blind(walk: Walk, rng: np.random.Generator) -> Walk:
-    """The same where nothing else knows."""
+def mirrored_alone(walk: Walk, rng: np.random.Generator) -> Walk:
+    """A board file with left and right exchanged, without IMU and true poses."""
     return replace(mirrored(walk, rng), imu=None, truth=None)
 
 
 def upside_down(walk: Walk, rng: np.random.Generator) -> Walk | None:
-    """Radar and IMU hang from the ceiling."""
+    """Radar and IMU mounted upside down."""
     if walk.imu is None:
         return None
     turned = Imu.__new__(Imu)
@@ -192,7 +192,7 @@ def upside_down(walk: Walk, rng: np.random.Generator) -> Walk | None:
 
 
 def backwards(walk: Walk, rng: np.random.Generator) -> Walk:
-    """True poses of a body whose radar looks back."""
+    """True poses of a body whose radar faces backwards."""
     turn = Rotation.from_euler("z", 180, degrees=True)
     pose = walk.truth.pose.copy()
     pose[:, 3:] = (Rotation.from_quat(pose[:, 3:]) * turn).as_quat()
@@ -200,7 +200,8 @@ def backwards(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def level(walk: Walk, rng: np.random.Generator) -> Walk | None:
-    """A board whose raised transmitter is not raised: it sees what the row sees at its place, at its own time."""
+    """A board whose raised transmitter is in the azimuth row: its channels have the signals of the row at its time
+    slot."""
     if str(walk.config.board) not in ("iwr1843boost", "iwr6843isk"):
         return None
     config, signal = walk.config, _signal(walk)
@@ -229,7 +230,7 @@ def receiver_copied(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def receiver_saturated(walk: Walk, rng: np.random.Generator) -> Walk:
-    """One whose converter ends at twice the standard deviation of what comes in."""
+    """A receiver whose converter saturates at twice the standard deviation of its input."""
     adc = walk.adc.astype(np.int32)
     most = int(2 * adc[:, :, :, 1].std())
     adc[:, :, :, 1] = np.clip(adc[:, :, :, 1], -most, most)
@@ -242,7 +243,7 @@ def transmitter_dead(walk: Walk, rng: np.random.Generator) -> Walk:
     return replace(walk, adc=adc)
 
 
-def alike(walk: Walk, rng: np.random.Generator) -> Walk:
+def identical(walk: Walk, rng: np.random.Generator) -> Walk:
     return replace(walk, adc=np.broadcast_to(walk.adc[:, :, :1, :1], walk.adc.shape).copy())
 
 
@@ -271,13 +272,13 @@ def noise(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def still(walk: Walk, rng: np.random.Generator) -> Walk:
-    """A radar that stands: a chirp again and again, with other noise."""
+    """A radar at rest: one chirp repeated with different noise."""
     adc = np.broadcast_to(walk.adc[:1, :1], walk.adc.shape)
     return replace(walk, adc=adc + _noise(walk, walk.adc.shape, rng), truth=None)
 
 
 def delayed(metres: float) -> Harm:
-    """All echoes, and the leakage, by so much too far away."""
+    """An additional delay of all echoes and the leakage, m."""
 
     def harm(walk: Walk, rng: np.random.Generator) -> Walk:
         turn = np.exp(2j * np.pi * metres / walk.config.max_range * np.arange(walk.config.samples)).astype(np.complex64)
@@ -287,18 +288,18 @@ def delayed(metres: float) -> Harm:
 
 
 def biased(metres: float) -> Harm:
-    """A range bias is configured that is none."""
+    """A wrong range bias in the configuration, m."""
     return lambda walk, rng: replace(walk, config=walk.config.changed("benchmark", range_bias=metres))
 
 
 # --- time -------------------------------------------------------------------------------------------------------------
 def stamps(step: Callable[[RadarConfig], float]) -> Harm:
-    """Frames so many s apart, by their stamps."""
+    """Time stamps with a wrong frame period, s."""
     return lambda walk, rng: replace(walk, times=walk.times[0] + step(walk.config) * np.arange(len(walk.times)))
 
 
 def configured(**factors: float) -> Harm:
-    """Fields of the configuration with wrong values, by factors."""
+    """Fields of the configuration multiplied by factors."""
 
     def harm(walk: Walk, rng: np.random.Generator) -> Walk:
         fields = {name: factor * getattr(walk.config, name) for name, factor in factors.items()}
@@ -317,12 +318,12 @@ def chirps_lost(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def frame_frozen(walk: Walk, rng: np.random.Generator) -> Walk:
-    """One frame, from the middle on."""
+    """The middle frame repeated to the end."""
     return replace(walk, adc=walk.adc[np.minimum(np.arange(len(walk.adc)), len(walk.adc) // 2)])
 
 
 def frames_twice(walk: Walk, rng: np.random.Generator) -> Walk:
-    """Every tenth frame holds the one before."""
+    """Every tenth frame is a copy of the previous one."""
     frames = np.arange(len(walk.adc))
     return replace(walk, adc=walk.adc[frames - (frames % 10 == 9)])
 
@@ -336,7 +337,7 @@ def two_seconds_again(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def shuffled(walk: Walk, rng: np.random.Generator) -> Walk:
-    """Within blocks of eight."""
+    """Frames in random order within blocks of eight."""
     frames = np.arange(len(walk.adc) // 8 * 8).reshape(-1, 8)
     return walk.of(rng.permuted(frames, axis=1).ravel(), stamped=False)
 
@@ -351,22 +352,22 @@ def reversed_(walk: Walk, rng: np.random.Generator) -> Walk:
 
 
 def rejoined(walk: Walk, rng: np.random.Generator) -> Walk:
-    """Two seconds are cut out, and stamps go on."""
+    """Two seconds removed, with continuous time stamps."""
     two, frames = round(2 / walk.config.frame_period), np.arange(len(walk.adc))
     start = int(rng.integers(len(frames) // 4, max(len(frames) - 2 * two, len(frames) // 4 + 1)))
     return walk.of(np.delete(frames, slice(start, start + two)), stamped=False)
 
 
 def teleported(walk: Walk, rng: np.random.Generator) -> Walk:
-    """The second half comes first."""
+    """The second half before the first."""
     return walk.of(np.roll(np.arange(len(walk.adc)), len(walk.adc) // 2), stamped=False)
 
 
-#: By name; those without a kind are none.
+#: Faults by name; entries without a kind are not faults.
 FAULTS: dict[str, Fault] = {
     "none": Fault("", plain),
-    "none; phases off by 20 deg": Fault("", hurt(hardships.phases_off(20.0))),
-    "none; gains off by 1 dB": Fault("", hurt(hardships.gains_off)),
+    "none; phase errors of 20 deg": Fault("", hurt(hardships.phase_errors(20.0))),
+    "none; gain errors of 1 dB": Fault("", hurt(hardships.gain_errors)),
     "none; noise + 6 dB": Fault("", hurt(hardships.noisier)),
     "I and Q exchanged": Fault("I and Q", exchanged_iq),
     "Q negated": Fault("I and Q", negated_q),
@@ -383,7 +384,7 @@ FAULTS: dict[str, Fault] = {
     "RX3, RX1, RX4, RX2": Fault("receiver order", receivers(2, 0, 3, 1)),
     "another board": Fault("board", other_board),
     "azimuth mirrored; IMU and poses": Fault("azimuth mirrored", mirrored),
-    "azimuth mirrored; radar alone": Fault("azimuth mirrored", mirrored_blind),
+    "azimuth mirrored; radar alone": Fault("azimuth mirrored", mirrored_alone),
     "elevation mirrored; poses": Fault("elevation mirrored", elevation_mirrored),
     "upside down, with its IMU": Fault("upside down", upside_down),
     "facing backwards; poses": Fault("facing backwards", backwards),
@@ -393,7 +394,7 @@ FAULTS: dict[str, Fault] = {
     "receiver copied": Fault("receiver copied", receiver_copied),
     "receiver saturated": Fault("receiver saturated", receiver_saturated),
     "transmitter dead": Fault("transmitter dead", transmitter_dead),
-    "all channels identical": Fault("channels identical", alike),
+    "all channels identical": Fault("channels identical", identical),
     "I alone": Fault("I without Q", i_alone),
     "I twice": Fault("I without Q", i_twice),
     "samples times 4": Fault("samples scaled", multiplied),

@@ -1,6 +1,6 @@
 """Figures in README and docs, taken from the parts of the pages: `python -m benchmarks.figures` writes them anew.
 
-A figure stands between two comments, and `FIGURES` says what it is:
+A figure is enclosed by two comments; `FIGURES` has the functions that write them:
 
     On test walks the mean error is <!-- figures: walks-mean -->0.13 and 0.034 m<!-- end -->.
 """
@@ -189,7 +189,7 @@ def conditions() -> str:
     times = "times the plain walks'"
     shown = [row for row in rows("conditions") if row["condition"] == "plain" or row[times] >= 2]
     lines = [
-        [name.replace("phases off by", "phase errors of"), row["odometry m"], row["SLAM m"], f"{row[times]:.1f}"]
+        [re.sub(r"^phases \w+ by", "phase errors of", name), row["odometry m"], row["SLAM m"], f"{row[times]:.1f}"]
         for name, row in ((str(row["condition"]), row) for row in shown)
     ]
     return table(["condition", "odometry, m", "SLAM, m", times], lines)
@@ -219,8 +219,8 @@ def real() -> str:
 
 
 def realism() -> str:
-    """How many pictures a network tells apart."""
-    shares = [row for row in rows("realism") if str(row["what"]).startswith("told apart")]
+    """Return the shares of pictures that a network classifies correctly as real or simulated."""
+    shares = rows("realism")[:2]  # the rows of the discriminator: single pictures, pairs
     return " and ".join(f"{row['furnished']:.0f} % of {words}" for row, words in zip(
         shares, ("single pictures", "pairs"), strict=True))  # fmt: skip
 

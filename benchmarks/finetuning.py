@@ -1,9 +1,9 @@
-"""What simulation saves of reality: the network for RadarHD's pictures trained on real walks alone, and the same walks
-shown to one that was trained in simulation first.
+"""Fine-tuning on real walks: a network for RadarHD's pictures, trained on real walks alone, and pretrained in
+simulation.
 
-Pictures are matched by time (`radarize.baselines.walks.clock`), and judged by time and by frame index. Only training
-walks are shown, and only test walks judge. The weights stay with whoever makes them, and those that are there already
-are not made again. Made for a GPU; `--steps 10` tries it on two cores.
+Networks are trained on training walks, with pictures matched by time (`radarize.baselines.walks.clock`), and evaluated
+on test walks, matched by time and by frame index. Weights are written to a folder of the user's; existing weights are
+used again. Trainings need a GPU; `--steps 10` is a trial on two cores.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from radarize.baselines.pictures.network import PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.training import DENSE, elsewhere, entropy, unpacked
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.baselines.walks.walks import FIRST, PERIOD, Walk
 from radarize.evaluation.benchmark.choices import TRAINING
 from radarize.io.console import progress
@@ -36,13 +36,13 @@ from radarize.signal.maps import Maps
 
 
 class Distances(NamedTuple):
-    """Chamfer distances, m."""
+    """Chamfer distances with frames matched by index and by time, m."""
 
-    number: float
-    instant: float
+    by_index: float
+    by_time: float
 
 
-#: Walks by how many of them are shown; steps and rates of both trainings.
+#: Training walks by their number; learning rates and steps of both trainings (`tuned`: pretrained in simulation).
 SHOWN = {
     1: (112,),
     5: (112, 118, 123, 129, 136),
@@ -57,7 +57,7 @@ STEPS = {
     (5, "tuned"): 800,
     (25, "tuned"): 2500,
 }
-#: Frames of a walk from one that is read to the next, as the network's windows have them: 0.2 s.
+#: Interval of the frames that are read, as in the network's windows: 0.2 s; batch size.
 EVERY, BATCH = 4, 64
 #: Test walks by place.
 GROUPS = {
@@ -68,7 +68,7 @@ GROUPS = {
 
 
 class Seen:
-    """Real walks in memory: the radar's pictures, and the lidar's of the same instants."""
+    """Real walks in memory: pictures of the radar, and of the lidar matched by time."""
 
     def __init__(self, walks: list[Walk], device: torch.device):
         self.radar, self.lidar, self.there = [], [], []
@@ -81,11 +81,11 @@ class Seen:
             self.there.append(partners >= 0)
 
     def items(self, window: int) -> list[tuple[int, int]]:
-        """Walk and newest frame of each window."""
+        """Return walk and newest frame of each window."""
         return [(walk, k) for walk, there in enumerate(self.there) for k in range(window - 1, len(there)) if there[k]]
 
     def windows(self, items: list[tuple[int, int]], window: int) -> tuple[Maps, Tensor]:
-        """Pictures and labels."""
+        """Return pictures and labels of windows."""
         pictures = torch.stack([self.radar[walk][k - window + 1 : k + 1] for walk, k in items]).float()
         return pictures[:, :, None], unpacked(torch.stack([self.lidar[walk][k] for walk, k in items]))
 
@@ -93,7 +93,7 @@ class Seen:
 def trained(
     seen: Seen, start: Path | None, rate: float, steps: int, report: Callable[[], None]
 ) -> tuple[PictureNet, Header]:
-    """The network after so many steps on real walks, and its header."""
+    """Train the network for a number of steps on real walks; return it with its header."""
     device = seen.radar[0].device
     net, header = load(Weights().of("pictures") if start is None else start, PictureNet, PRESETS["radarhd"])
     if start is None:
@@ -119,20 +119,20 @@ def trained(
 
 @torch.inference_mode()
 def dense(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
-    """The probability from which on every cell has a point that brings the points nearest to the lidar's, on the walks
-    that were shown."""
-    apart = {value: [] for value in DENSE}
+    """Choose the probability above which every cell has a point, by the least median Chamfer distance on the training
+    walks."""
+    distances = {value: [] for value in DENSE}
     for item in seen.items(window)[::every]:
         pictures, label = seen.windows([item], window)
         likely = net.estimate(pictures)
-        for value, found in apart.items():
+        for value, found in distances.items():
             shown = points(likely, value)[0].cpu().numpy()
-            found.append(Apart.of_pictures(shown, label[0].bool().cpu().numpy()).chamfer)
-    return min(apart, key=lambda value: np.nanmedian(apart[value]))
+            found.append(PointCloudDistance.of_pictures(shown, label[0].bool().cpu().numpy()).chamfer)
+    return min(distances, key=lambda value: np.nanmedian(distances[value]))
 
 
 def train(options: argparse.Namespace) -> None:
-    """Make the weights that are not there yet."""
+    """Train the networks whose weights do not exist."""
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     plan = {key: options.steps or steps for key, steps in STEPS.items() if not _path(options.weights, *key).is_file()}
     done = count(1)
@@ -150,34 +150,36 @@ def train(options: argparse.Namespace) -> None:
 
 
 def window(walk: Walk, end: int, frames: int) -> UInt8[np.ndarray, "frame range azimuth"]:
-    """The radar's pictures that a network sees at a frame."""
+    """Return the radar's pictures of the window that ends at a frame."""
     return np.stack([walk.radar(k) for k in range(end - EVERY * (frames - 1), end + 1, EVERY)])
 
 
 def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distances], Header]:
-    """Median Chamfer distance of each walk, m, by number and by instant."""
+    """Return the median Chamfer distances of each walk, m, matched by frame index and by time."""
     net, header = load(path, PictureNet, PRESETS["radarhd"])
     found = {}
     for walk in walks:
-        partners, apart = Clock.of(walk).partners(walk.frames), []
+        partners, distances = Clock.of(walk).partners(walk.frames), []
         for end in (frame for frame in range(FIRST, walk.frames, every) if partners[frame] >= 0):
             pictures = torch.from_numpy(window(walk, end, header.frames))[None, :, None].float()
             with torch.inference_mode():
                 cells = points(net.estimate(pictures), net.dense)[0].numpy()
-            apart.append([Apart.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))])
-        found[walk.number] = Distances(*(float(each) for each in np.nanmedian(apart, axis=0)))
+            distances.append(
+                [PointCloudDistance.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))]
+            )
+        found[walk.number] = Distances(*(float(each) for each in np.nanmedian(distances, axis=0)))
     return found, header
 
 
 def draw(rows: list[dict]) -> Figure:
-    """Error over minutes, with and without simulation before."""
+    """Plot the Chamfer distance over the duration of the real training walks, with and without simulation."""
     figure, axes = plt.subplots(1, len(GROUPS), figsize=(11, 3.2), sharey=True)
     for axis, group in zip(axes, GROUPS, strict=True):
         for how, word in (("tuned", "simulation first"), ("alone", "real walks alone")):
             some = [row for row in rows if row["how"] == how]
             axis.plot([row["minutes"] for row in some], [row[group] for row in some], "o-", label=word)
         axis.axhline(next(row[group] for row in rows if row["how"] == "simulation"), ls=":", label="simulation alone")
-        axis.set(title=group, xlabel="minutes of real walks", xscale="log")
+        axis.set(title=group, xlabel="real training walks, min", xscale="log")
     axes[0].set(ylabel="Chamfer distance, m", ylim=(0, None))
     axes[0].legend()
     figure.tight_layout()
@@ -185,12 +187,12 @@ def draw(rows: list[dict]) -> Figure:
 
 
 @script(
-    "What simulation saves of reality",
+    "Fine-tuning on real walks",
     data=CLONE,
-    start=(Weights().of("pictures"), "weights that were trained in simulation"),
-    steps=(0, "of each training; as many as it is worth if 0"),
+    start=(Weights().of("pictures"), "weights trained in simulation"),
+    steps=(0, "steps of each training; the numbers of the page if 0"),
     weights=(Path("tuned"), "folder of the weights"),
-    every=(6, "of so many frames of the test walks one is judged"),
+    every=(6, "every N-th frame of the test walks is evaluated"),
 )
 def main(options: argparse.Namespace) -> Page:
     train(options)
@@ -202,7 +204,7 @@ def main(options: argparse.Namespace) -> Page:
         row = {"how": how, "real walks": shown, "minutes": header.metrics.get("minutes", 0.0)}
         for (place, some), by in product(GROUPS.items(), reversed(Distances._fields)):
             mean = np.mean([getattr(found[walk], by) for walk in some if walk in found])
-            row[place if by == "instant" else f"{place}, by number"] = mean
+            row[place if by == "by_time" else f"{place}, by frame index"] = mean
         rows.append(row)
     return Page(
         rows,
@@ -210,11 +212,11 @@ def main(options: argparse.Namespace) -> Page:
         data=radarhd("RadarHD's test walks", walks),
         networks=tuple(UsedNetwork.of(path) for path in paths.values()),
         notes=[
-            "Median Chamfer distance of a walk's points from the lidar's of the same instant, and of the same number, "
-            "m, mean over the walks of a group; `alone`: trained on real walks alone; `tuned`: trained on simulated "
-            "walks first; `simulation`: on these alone.",
-            "Steps, rates and walks were fixed before any test walk was looked at; the probability from which on "
-            "every cell has a point is that which is best on the walks that were shown.",
+            "Median Chamfer distance of a walk's points from the lidar's, matched by time and by frame index, m; mean "
+            "over the walks of a group. `alone`: trained on real walks only; `tuned`: pretrained on simulated walks; "
+            "`simulation`: trained on simulated walks only.",
+            "Steps, learning rates and training walks were fixed before the evaluation on test walks; the probability "
+            "above which every cell has a point was chosen on the training walks.",
         ],
     )
 

@@ -1,7 +1,7 @@
-"""Damaged and hostile input for every reader of foreign bytes: each must end in a result or in one sentence.
+"""Fuzzing of every reader of files and packets: each input must give a result or an error of one sentence.
 
-Inputs and what a reader may take are those of `tests/fuzzing`. Each reader runs in a process of its own, which dies of
-a crash in a library, of a hang, or of memory without end; its input then lies where the message says.
+Inputs and limits of run time and memory are those of `tests/fuzzing`. Each reader runs in a separate process, which
+ends after a crash, a hang or exceeded memory; the error message has the path of the input.
 """
 
 import argparse
@@ -29,19 +29,19 @@ from radarize.io.replacing import replacing
 from tests.fuzzing.reader import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, Attempt, Reader, attempt
 from tests.fuzzing.readers import READERS
 
-#: Inputs of one seed: hypothesis remembers what it has tried. Of the first seed's, what they reach is measured.
+#: Inputs per seed; coverage is measured with those of the first seed.
 _BATCH = 500
-#: Readers that take over 5 ms for an input, making it included; they get so much less.
+#: Readers that need over 5 ms per input including its generation, and the factor by which they get fewer inputs.
 _SLOW, _LESS = {
     "pcap", ".bin", "npy", "mat", "HDF5 recording", "ROS 1 bag", "ROS 2 mcap", "ROS 2 db3",
     *(name for name in READERS if name.startswith("run: ")),
 }, 4  # fmt: skip
-#: Address space beyond what a process has before it starts, bytes; and s until a hang is the end of it.
+#: Maximum address space beyond that at the start, bytes; time after which an input counts as a hang, s.
 _ADDRESSES, _HANG = 4 << 30, 120
 
 
 def tried(reader: Reader, count: int, number: int, folder: Path) -> list[Attempt]:
-    """What came of the inputs of one seed."""
+    """Run a reader on the inputs of one seed."""
     found = []
 
     def one(data: object) -> None:
@@ -57,8 +57,8 @@ def tried(reader: Reader, count: int, number: int, folder: Path) -> list[Attempt
 
 
 def try_all(name: str, count: int, first: int, folder: Path) -> dict[str, object]:
-    """Inputs for one reader, in its process; a row of the table."""
-    warnings.simplefilter("ignore")  # numpy and scipy about numbers that make no sense
+    """Run one reader on all inputs, in its process; return a row of the table."""
+    warnings.simplefilter("ignore")  # of numpy and scipy about meaningless numbers
     reader, found = READERS[name](), []
     used = resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0])
     resource.setrlimit(resource.RLIMIT_AS, (used + _ADDRESSES, used + _ADDRESSES))
@@ -78,7 +78,7 @@ def try_all(name: str, count: int, first: int, folder: Path) -> dict[str, object
 
 
 def reached(name: str, first: int, folder: Path) -> float:
-    """Of the lines of this project's functions that a reader enters: share that the first seed's inputs reach, %."""
+    """Return the line coverage of this project's functions that a reader enters, by the inputs of the first seed, %."""
     warnings.simplefilter("ignore")
     reader = READERS[name]()
     coverage = Coverage(data_file=None, source_pkgs=[radarize.__name__, radarsim.__name__])
@@ -97,21 +97,21 @@ def reached(name: str, first: int, folder: Path) -> float:
 
 
 def judged(name: str, count: int, first: int) -> dict[str, object] | str:
-    """A row of the table, from processes of its own; or what the reader failed on."""
+    """Return a row of the table, from separate processes; or the error of the reader."""
     count = count // _LESS if name in _SLOW else count
     folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
     with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as process:
         try:
             row = process.submit(try_all, name, count, first, folder).result()
             row["lines reached, %"] = process.submit(reached, name, first, folder).result()
-        except Exception as error:  # the reader's own, or that its process has died
+        except Exception as error:  # of the reader, or of its process
             return f"{name}: failed on what lies in {folder} ({error})"
     folder.rmdir()
     return row
 
 
 def kept(name: str, count: int, first: int, earlier: str | None = None) -> dict[str, object] | str:
-    """What is `judged`, or was by a run of this commit or an earlier one: a long one goes on where it was stopped."""
+    """Return the result of `judged`, or a stored one of this commit or an earlier one, so that a run can continue."""
     now = commit(Path(__file__))
     for source in filter(None, (now, earlier)):
         path = _row(name, count, first, source)
@@ -130,14 +130,14 @@ def _row(name: str, count: int, first: int, source: str) -> Path:
 
 @script(
     "Damaged and hostile input",
-    inputs=(5000, f"for each reader; for slow ones, {', '.join(sorted(_SLOW))}, {_LESS} times fewer"),
-    seed=(0, "of hypothesis"),
-    workers=(len(os.sched_getaffinity(0)), "readers at a time"),
-    reader=(str, "this one alone, without a table", {"choices": list(READERS)}),
-    earlier=(str, "rows of a run at this commit count, too, which another reader's fault has ended"),
+    inputs=(5000, f"inputs per reader; {_LESS} times fewer for slow ones ({', '.join(sorted(_SLOW))})"),
+    seed=(0, "seed of hypothesis"),
+    workers=(len(os.sched_getaffinity(0)), "number of readers in parallel"),
+    reader=(str, "run only this reader, without a table", {"choices": list(READERS)}),
+    earlier=(str, "use stored rows of this commit, too"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """The table, if no reader fails."""
+    """Run all readers; fail if one of them fails."""
     if options.reader:
         row = judged(options.reader, options.inputs, options.seed)
         if isinstance(row, str):
@@ -155,15 +155,14 @@ def main(options: argparse.Namespace) -> Page:
         same([*rows, {"reader": "all", **total, **most}]),
         data=Data(f"{total['inputs']} damaged inputs", (), options.seed),
         notes=[
-            "Valid files after bit flips, cuts, splices and edits of fields, or random bytes, drawn by hypothesis. "
-            "None raised anything but a refusal in one sentence, crashed or hung.",
-            f"More than {MOST_SECONDS:g} s of processor time, or {MOST_MEMORY >> 20} MiB and {MOST_TIMES} times its "
-            "size in memory, would have failed the input. Memory is what was resident beyond the state before; the "
-            "longest is in processor time, s are on the clock, making and placing the inputs included.",
-            f"Lines reached: by the first {_BATCH} inputs, of the lines of this project's functions that a reader "
-            "enters; compiled functions are left out.",
-            "Commit: of the code that was tried; where a reader failed, it was mended and tried again, and others were "
-            "not.",
+            "Inputs are valid files after bit flips, cuts, splices and edits of fields, or random bytes, generated by "
+            "hypothesis. No input caused a crash, a hang, or an exception other than an error of one sentence.",
+            f"Limits per input: {MOST_SECONDS:g} s of processor time; {MOST_MEMORY >> 20} MiB and {MOST_TIMES} times "
+            "its size of memory. Memory is the increase of the resident size; longest is processor time; s is wall "
+            "time, including the generation of inputs.",
+            f"lines reached: line coverage of this project's functions that a reader enters, by the first {_BATCH} "
+            "inputs, without compiled functions.",
+            "commit: commit of the tested code; a reader that failed was corrected and run again, without the others.",
             surroundings(),
         ],
     )

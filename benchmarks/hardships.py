@@ -1,4 +1,4 @@
-"""What makes a walk hard: samples that are hurt, walks that move otherwise, or elsewhere."""
+"""Hard conditions for odometry: degraded samples, other motions, other places."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,12 +16,12 @@ from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
 
-#: Counts, of one chirp: as strong as furniture at 2 m.
+#: Amplitude of an interfering chirp, ADC counts: equal to the echo of furniture at 2 m.
 _INTERFERER = 1000.0
 
 
 class Samples(NamedTuple):
-    """What is recorded: I/Q, start of each frame (s), and which chirps arrived."""
+    """I/Q samples, start of each frame (s), and whether each chirp arrived."""
 
     adc: Int16[np.ndarray, "frame loop tx rx sample 2"]
     times: Float[np.ndarray, "frame"]
@@ -29,25 +29,25 @@ class Samples(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """What is other than on the plain walk.
+    """A modification of the plain walk.
 
     Attributes:
-        hurt: what becomes of its samples.
-        scenario: what is simulated instead.
+        hurt: modifies its samples.
+        scenario: modifies the simulated scenario.
     """
 
     hurt: Callable[[Samples, np.random.Generator], Samples] | None = None
     scenario: Callable[[Scenario], Scenario] | None = None
 
 
-# --- samples that are hurt --------------------------------------------------------------------------------------------
+# --- degraded samples -------------------------------------------------------------------------------------------------
 def _added(samples: Samples, wave: np.ndarray) -> Samples:
     counts = samples.adc + np.stack([wave.real, wave.imag], axis=-1)
     return samples._replace(adc=np.clip(np.rint(counts), -32768, 32767).astype(np.int16))
 
 
-def phases_off(most: float) -> Callable[[Samples, np.random.Generator], Samples]:
-    """Each channel by up to so many degrees, the same all along."""
+def phase_errors(most: float) -> Callable[[Samples, np.random.Generator], Samples]:
+    """Constant phase errors of the channels, uniform up to a maximum in deg."""
 
     def hurt(samples: Samples, rng: np.random.Generator) -> Samples:
         turn = np.random.default_rng(1).uniform(-most, most, samples.adc.shape[2:4])
@@ -56,8 +56,8 @@ def phases_off(most: float) -> Callable[[Samples, np.random.Generator], Samples]
     return hurt
 
 
-def gains_off(samples: Samples, rng: np.random.Generator) -> Samples:
-    """Each channel by up to 1 dB, the same all along."""
+def gain_errors(samples: Samples, rng: np.random.Generator) -> Samples:
+    """Constant gain errors of the channels, uniform up to 1 dB."""
     return _multiplied(samples, 10 ** (np.random.default_rng(1).uniform(-1, 1, samples.adc.shape[2:4]) / 20))
 
 
@@ -67,7 +67,7 @@ def _multiplied(samples: Samples, channels: np.ndarray) -> Samples:
 
 
 def noisier(samples: Samples, rng: np.random.Generator) -> Samples:
-    """By 6 dB: thrice the noise power is added."""
+    """A noise floor that is 6 dB higher: three times the noise power is added."""
     shape = samples.adc.shape[:-1]
     signal = samples.adc.astype(np.float32).view(np.complex64)[..., 0]
     sigma = np.sqrt(3 * noise_floor(noise_profile(signal)) / 2)
@@ -75,20 +75,20 @@ def noisier(samples: Samples, rng: np.random.Generator) -> Samples:
 
 
 def receiver_dead(samples: Samples, rng: np.random.Generator) -> Samples:
-    """The second one, of which the converter's own noise is left."""
+    """RX2 without a signal, except the noise of its converter."""
     adc = samples.adc.copy()
     adc[:, :, :, 1] = np.rint(rng.normal(0, 5, adc[:, :, :, 1].shape))
     return samples._replace(adc=adc)
 
 
 def chirps_lost(samples: Samples, rng: np.random.Generator) -> Samples:
-    """One in twenty."""
+    """Loss of 5 % of the chirps."""
     valid = samples.valid & (rng.random(samples.valid.shape) >= 0.05)
     return samples._replace(adc=samples.adc * valid[..., None, None, None], valid=valid)
 
 
 def interference(share: float) -> Callable[[Samples, np.random.Generator], Samples]:
-    """A share of the chirps crossed by another radar's ramp, which sweeps the band within half a chirp."""
+    """Interference of a share of the chirps by another radar, whose ramp crosses the IF band within half a chirp."""
 
     def hurt(samples: Samples, rng: np.random.Generator) -> Samples:
         wave = np.zeros(samples.adc.shape[:-1], np.complex64)
@@ -104,7 +104,7 @@ def interference(share: float) -> Callable[[Samples, np.random.Generator], Sampl
 
 
 def frames_lost(seconds: float, when: tuple[float, ...]) -> Callable[[Samples, np.random.Generator], Samples]:
-    """So many seconds, from each of some instants."""
+    """Loss of all frames for a number of seconds, from each of some times, s."""
 
     def hurt(samples: Samples, rng: np.random.Generator) -> Samples:
         kept = np.all([(samples.times < t) | (samples.times >= t + seconds) for t in when], axis=0)
@@ -114,9 +114,9 @@ def frames_lost(seconds: float, when: tuple[float, ...]) -> Callable[[Samples, n
     return hurt
 
 
-# --- walks of another kind --------------------------------------------------------------------------------------------
+# --- other motions and places -----------------------------------------------------------------------------------------
 def _along(motion: Motion, clock: Callable[[np.ndarray], np.ndarray], duration: float) -> Motion:
-    """The same way by another clock."""
+    """The same path with another course of time."""
     times = np.arange(-1.0, duration + 1.0, 0.02)
     there = clock(times)
     path, attitude = CubicSpline(times, motion.path(there)), RotationSpline(times, motion.attitude(there))
@@ -124,7 +124,7 @@ def _along(motion: Motion, clock: Callable[[np.ndarray], np.ndarray], duration: 
 
 
 def faster(speed: float) -> Callable[[Scenario], Scenario]:
-    """All of it quicker, so that `speed` (m/s) is the fastest."""
+    """The same path at a higher speed, with the maximum `speed` (m/s)."""
 
     def changed(scenario: Scenario) -> Scenario:
         motion = scenario.motion
@@ -136,7 +136,7 @@ def faster(speed: float) -> Callable[[Scenario], Scenario]:
 
 
 def swinging(rate: float) -> Callable[[Scenario], Scenario]:
-    """To and fro on the way, at `rate` (deg/s) at the fastest, every 2 s."""
+    """An additional oscillation of the yaw with a period of 2 s and a maximum `rate` (deg/s)."""
 
     def changed(scenario: Scenario) -> Scenario:
         motion = scenario.motion
@@ -149,12 +149,12 @@ def swinging(rate: float) -> Callable[[Scenario], Scenario]:
 
 
 def standing(scenario: Scenario) -> Scenario:
-    """Half a minute, in the middle."""
+    """A stop of 30 s in the middle of the path."""
     motion, lasts = scenario.motion, 30.0
     middle = motion.duration / 2
 
     def clock(times: np.ndarray) -> np.ndarray:
-        # It slows down and sets off again within half a second.
+        # Deceleration and acceleration within half a second.
         fine = np.arange(-1.0, motion.duration + lasts + 1.0, 0.01)
         pace = np.clip(np.abs(fine - middle - lasts / 2) - lasts / 2 + 0.5, 0, 0.5) / 0.5
         return np.interp(times, fine, -1.0 + np.cumsum(pace) * 0.01)
@@ -163,7 +163,7 @@ def standing(scenario: Scenario) -> Scenario:
 
 
 def sidestepping(scenario: Scenario) -> Scenario:
-    """To and fro, 1.3 m in front of a bare front of glass."""
+    """Sideways motion back and forth, 1.3 m in front of a bare glass front."""
     times = np.arange(-1.0, 31.0, 0.05)
     phase = 2 * np.pi / 20 * np.clip(times, 0, None)
     place = np.stack([4 - 2.4 * np.cos(phase), 3.7 + 0.1 * np.sin(3.1 * phase), np.full_like(times, 1.2)], axis=1)
@@ -172,8 +172,8 @@ def sidestepping(scenario: Scenario) -> Scenario:
     return replace(scenario, scene=Scene.load("stress/people"), motion=Motion(30.0, CubicSpline(times, place), turns))
 
 
-def _hollow(name: str, size: tuple[float, float, float], middle: tuple[float, float], **life: float) -> Scene:
-    """An empty box of concrete, of so many metres along x, y, z, on the floor about a place."""
+def _hollow(name: str, size: tuple[float, float, float], middle: tuple[float, float], **surfaces: float) -> Scene:
+    """Return a scene of an empty concrete box, of a size along x, y, z (m), on the floor around a point."""
     length, width, height = size
     objects = [
         {
@@ -188,11 +188,11 @@ def _hollow(name: str, size: tuple[float, float, float], middle: tuple[float, fl
         {"name": "ceiling", "size": [length, width], "position": [*middle, height], "facing": [0, 0, -1]},
     ]
     wall = {"shape": "rectangle", "material": "concrete"}
-    return Scene.of({"objects": [wall | each for each in objects]} | life, name)
+    return Scene.of({"objects": [wall | each for each in objects]} | surfaces, name)
 
 
 def hall(scenario: Scenario) -> Scenario:
-    """Round the middle of a hall, whose walls are out of reach."""
+    """A circle in the middle of a hall whose walls are out of range."""
     scene = _hollow("hall", (30.0, 30.0, 8.0), (0.0, 0.0), clutter=1.0)
     times = np.arange(-1.0, 31.0, 0.05)
     course = 2 * np.pi / 25 * np.clip(times, 0, None)
@@ -202,19 +202,19 @@ def hall(scenario: Scenario) -> Scenario:
 
 
 def corridor(scenario: Scenario) -> Scenario:
-    """There and back through an empty one of 60 m by 2.2 m."""
+    """A walk back and forth through an empty corridor of 60 m by 2.2 m."""
     scene = _hollow("corridor of 60 m", (60.0, 2.2, 2.6), (30.0, 0.0), unevenness=1.0)
     places = np.array([[2.0, 0.2], [58.0, -0.2], [2.0, 0.2]])
     return replace(scenario, scene=scene, motion=Walk("handheld", waypoints=places).through(scene, scenario.seed))
 
 
 def crowd(scenario: Scenario) -> Scenario:
-    """Five people walk about, 0.6 m away and more."""
+    """Five pedestrians at distances of at least 0.6 m."""
     return replace(scenario, scene=with_pedestrians(scenario.scene, scenario.motion, 5, scenario.seed))
 
 
 def mounted(height: float = 1.2, pitch: float = 0.0, roll: float = 0.0) -> Callable[[Scenario], Scenario]:
-    """At another height (m), or tilted (deg)."""
+    """Another mounting height (m), pitch or roll (deg)."""
 
     def changed(scenario: Scenario) -> Scenario:
         motion, raised = scenario.motion, np.array([0.0, 0.0, height - 1.2])
@@ -228,9 +228,9 @@ def mounted(height: float = 1.2, pitch: float = 0.0, roll: float = 0.0) -> Calla
 
 CONDITIONS: dict[str, Condition] = {
     "plain": Condition(),
-    "phases off by 10 deg": Condition(phases_off(10.0)),
-    "phases off by 20 deg": Condition(phases_off(20.0)),
-    "gains off by 1 dB": Condition(gains_off),
+    "phase errors of 10 deg": Condition(phase_errors(10.0)),
+    "phase errors of 20 deg": Condition(phase_errors(20.0)),
+    "gain errors of 1 dB": Condition(gain_errors),
     "noise + 6 dB": Condition(noisier),
     "a receiver dead": Condition(receiver_dead),
     "5 % of chirps lost": Condition(chirps_lost),

@@ -1,8 +1,8 @@
-"""Each export read by the program that it is for, unmodified: what ran, and what it found.
+"""Interoperability: each export is read by an unmodified program of another project.
 
-Programs of pip are installed into environments of their own below `--environments`. Those that are on GitHub only are
-looked for below `--clones` (`git clone https://github.com/OWNER/NAME` there); what is not there is said. Programs under
-the GPL are run where they lie, and nothing of them is kept.
+Programs on PyPI are installed into separate environments in `--environments`. Programs on GitHub only are run from
+clones in `--clones` (`git clone https://github.com/OWNER/NAME`); missing ones are listed as not run. Programs under the
+GPL are run in place, and none of their code is kept.
 """
 
 import argparse
@@ -28,7 +28,7 @@ from radarsim.world.export import export_scene
 from radarsim.world.scene import Scene
 
 SCENE, PLATFORM, SEED, DURATION = "office", "cart", 3, 1.5
-#: What pip installs, by environment; radarize_ae wants the versions of its time.
+#: Packages by environment; radarize_ae needs old versions.
 PACKAGES = {
     "own": (),
     "rover": ("abstract_dataloader", "tyro", "einops", "optree", "jaxtyping", "pyyaml", "beartype", "scipy", "xwr"),
@@ -38,7 +38,8 @@ PACKAGES = {
         "open3d==0.18.0", "rosbags==0.9.20", "imageio", "pillow", "matplotlib",
     ),
 }  # fmt: skip
-#: ROS 1's modules, which pip has not, as far as radarize_ae's create_dataset.py uses them.
+#: Substitutes for modules of ROS 1, which are not on PyPI, with the functions that radarize_ae's create_dataset.py
+#: uses.
 ROS = {
     "rosbag.py": """
         from pathlib import Path
@@ -83,10 +84,11 @@ class Trial(NamedTuple):
     """An export and a program.
 
     Attributes:
-        export: what is read.
-        program: its name; licence: of it.
-        clone: repository that it is run from, OWNER/NAME; None: pip has it.
-        run: returns what the program found.
+        export: exported formats.
+        program: name of the program.
+        licence: licence of the program.
+        clone: repository of the program, OWNER/NAME; None: it is on PyPI.
+        run: runs the program, and returns its result.
     """
 
     export: str
@@ -97,7 +99,7 @@ class Trial(NamedTuple):
 
 
 class Bench(NamedTuple):
-    """Where things lie: the recording, a run of it, exports, clones, and environments."""
+    """Paths of the recording, its run, exports, clones and environments."""
 
     recording: Path
     run: Path
@@ -106,7 +108,7 @@ class Bench(NamedTuple):
     environments: Path
 
     def python(self, name: str) -> str:
-        """Interpreter of an environment, which is made if need be."""
+        """Return the interpreter of an environment, which is created if it does not exist."""
         if not PACKAGES[name]:
             return sys.executable
         home = self.environments / name
@@ -117,7 +119,7 @@ class Bench(NamedTuple):
         return str(interpreter)
 
     def call(self, environment: str, code: str, *arguments: object, path: str = "", cwd: Path | None = None) -> dict:
-        """What a program prints last, JSON; `code` is a script or the name of a file."""
+        """Run a script, or a file of a script, and return the JSON in its last line of output."""
         words = [code] if code.endswith(".py") else ["-c", textwrap.dedent(code)]
         environ = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
         command = [self.python(environment), *words, *map(str, arguments)]
@@ -170,7 +172,7 @@ def xwr_configuration(bench: Bench) -> str:
 
 
 def radarize_ae(bench: Bench) -> str:
-    """Its data set of our bag, and its maps beside ours."""
+    """Make its data set from our bag, and compare its maps with ours."""
     bag = export(bench.recording, "radarize-ae", bench.folder / "walk_sc_1_0.bag", time_offset=0.0)
     modules = bench.folder / "ros"
     for name, text in ROS.items():
@@ -184,10 +186,10 @@ def radarize_ae(bench: Bench) -> str:
     with Recording(bench.recording) as recording, np.load(bag.with_suffix(".npz")) as theirs:
         maker = PublishedMaps(recording.config)
         ours = maker(recording.adc(0, len(recording)), frames=slice(4, None))
-        apart = np.concatenate([np.abs(ours[own] - theirs[other][2:, 0]).ravel() for other, own in names.items()])
+        errors = np.concatenate([np.abs(ours[own] - theirs[other][2:, 0]).ravel() for other, own in names.items()])
         frames = len(theirs["time"])
     return (
-        f"{frames} frames; maps differ by {apart.max():.1g} at most, {(apart < 1e-4).mean():.2%} of cells within 1e-4"
+        f"{frames} frames; maps differ by {errors.max():.1g} at most, {(errors < 1e-4).mean():.2%} of cells within 1e-4"
     )
 
 
@@ -214,16 +216,16 @@ def roverd(bench: Bench) -> str:
         folder, path=str(bench.clones / "red-rover/format/src"),
     )  # fmt: skip
     with Recording(bench.recording) as recording:
-        apart = np.abs(np.array(found["velocity"]) - recording.read("truth/velocity")[5, :3]).max()
-        assert apart < 1e-3 and found["frames"] == len(recording)
+        error = np.abs(np.array(found["velocity"]) - recording.read("truth/velocity")[5, :3]).max()
+        assert error < 1e-3 and found["frames"] == len(recording)
         assert abs(found["resolution"] - recording.config.range_resolution) < 1e-6
     return (
-        f"{found['frames']} frames, spectrum of {' x '.join(map(str, found['shape']))}, velocity within {apart:.0e} m/s"
+        f"{found['frames']} frames, spectrum of {' x '.join(map(str, found['shape']))}, velocity within {error:.0e} m/s"
     )
 
 
 def evo(bench: Bench) -> str:
-    """evo_traj on the ROS 1 and ROS 2 bags and on the TUM file."""
+    """Run evo_traj on the ROS 1 and ROS 2 bags and the TUM file."""
     bag1 = export(bench.recording, "radarize-ae", bench.folder / "evo.bag")
     bag2 = export(bench.recording, "ros2", bench.folder / "evo", run=bench.run)
     tum = export(bench.run, "tum", bench.folder / "evo.tum")
@@ -253,7 +255,7 @@ def mcap(bench: Bench) -> str:
 
 
 def meshes(bench: Bench) -> str:
-    """Open3D on points, scans and the scene."""
+    """Read points, scans and the scene by Open3D."""
     points = export(bench.recording, "ply", bench.folder / "points.ply")
     scans = export(bench.run, "ply", bench.folder / "scans.ply")
     room = [export_scene(Scene.load(SCENE), bench.folder / f"room{suffix}") for suffix in (".ply", ".glb")]
@@ -284,28 +286,28 @@ TRIALS = (
 
 
 def tried(trial: Trial, bench: Bench) -> dict[str, str]:
-    """A row of the table."""
+    """Run a program; return a row of the table."""
     if trial.clone is not None and not (bench.clones / trial.clone.split("/")[1]).is_dir():
         result = f"not run: no clone of github.com/{trial.clone}"
     else:
         try:
             result = trial.run(bench)
-        except Exception as error:  # of foreign programs: whatever it is, the others are tried
+        except Exception as error:  # of other programs: the remaining ones are run
             result = f"failed: {' '.join(str(error).split())[:200] or type(error).__name__}"
     return {"export": trial.export, "program": trial.program, "licence": trial.licence, "found": result}
 
 
 def simulated(path: Path) -> Path:
-    """A recording to export."""
+    """Simulate a recording to export."""
     sensors = ("depth-strip", "imu")
     return simulate(SCENE, path, platform=PLATFORM, duration=DURATION, seed=SEED, sensors=sensors)
 
 
 @script(
-    "Exports, read by the programs that they are for",
-    clones=("clones", "folder of clones of programs that pip has not"),
-    environments=("", "folder for their environments, kept for the next time; a temporary one if none"),
-    recording=("", "with depth strip, IMU and truth, of few frames; 1.5 s are simulated if none"),
+    "Exports read by other programs",
+    clones=("clones", "folder of clones of programs that are not on PyPI"),
+    environments=("", "folder for environments, which are used again; a temporary one if empty"),
+    recording=("", "recording of few frames with depth strip, IMU and truth; 1.5 s are simulated if empty"),
 )
 def main(options: argparse.Namespace) -> Page:
     with tempfile.TemporaryDirectory() as temporary:
@@ -319,7 +321,8 @@ def main(options: argparse.Namespace) -> Page:
         with Recording(recording) as source:
             walk = f"{source.attributes.get('scene', recording.stem)}, {PLATFORM}, {len(source)} frames"
     notes = (
-        "The radar is the preset `radarize`. This script stands in for the modules of ROS 1 that radarize_ae imports.",
-        "Where maps of radarize_ae differ by more than 1e-4, its single precision shows, beside strong echoes.",
+        "The radar is the preset `radarize`. The modules of ROS 1 that radarize_ae imports are replaced by this "
+        "script.",
+        "Differences to maps of radarize_ae above 1e-4 are due to its single precision, beside strong echoes.",
     )
     return Page(rows, Data(f"a simulated walk with depth strip and IMU: {walk}", (), SEED), notes)

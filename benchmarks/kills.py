@@ -1,4 +1,5 @@
-"""Kills at random moments: what is begun again ends as if nothing had been, and a capture loses what was on its way."""
+"""Kills at random times: commands that are restarted give the same results, and a capture loses only its last
+frames."""
 
 import argparse
 import hashlib
@@ -21,7 +22,7 @@ from radarize.io.recording import Recording, recover
 from radarize.radar.presets import load_config
 from tests.virtual import emulator, record
 
-#: What a data set of seconds is made of.
+#: Specification of a short data set.
 SPECIFICATION = {
     "name": "kills",
     "seed": 1,
@@ -29,7 +30,7 @@ SPECIFICATION = {
     "recordings": [{"building": "office", "platform": "cart", "count": 2, "duration": 0.5}],
 }
 EPOCHS = 4
-#: s that a capture lives once its file is there.
+#: Time from the creation of a capture's file to its kill, s.
 LIVES = 1.5, 6.0
 
 
@@ -38,9 +39,9 @@ class Case:
     """A command that is killed.
 
     Attributes:
-        words: of the command; {out} stands for what it writes.
-        again: words added when it is begun again.
-        made: files below {out} that must come out the same, as a pattern.
+        words: words of the command; {out} is replaced by the output folder.
+        made: pattern of the files in {out} that must be the same.
+        again: words added for a restart.
     """
 
     words: Sequence[object]
@@ -48,14 +49,14 @@ class Case:
     again: tuple[str, ...] = ()
 
     def begin(self, out: Path, again: bool) -> subprocess.Popen:
-        """Start the command, in a group of its own with all that it starts."""
+        """Start the command in a process group of its own."""
         words = [str(word).format(out=out) for word in (*self.words, *(self.again if again else ()))]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         return subprocess.Popen([sys.executable, "-m", *words], start_new_session=True, **quiet)
 
 
 def bytes_of(case: Case, out: Path) -> dict[str, str]:
-    """What a command has made, file by file; of tables their figures alone, for times differ from run to run."""
+    """Return digests of the files that a command has made; of tables only the figures, because times differ."""
 
     def digest(path: Path) -> str:
         data = path.read_bytes()
@@ -67,10 +68,10 @@ def bytes_of(case: Case, out: Path) -> dict[str, str]:
 
 
 def killed(name: str, case: Case, kills: int, folder: Path, rng: np.random.Generator) -> dict[str, object]:
-    """A command that is killed and begun again, so many times in all: a row of the table. Where it comes to its end
-    before it is killed, what it made is compared, and it begins anew in another folder."""
+    """Kill and restart a command a number of times; return a row of the table. If it ends before the kill, its files
+    are compared, and it is started in another folder."""
     whole, expected, ended = folder / f"{name}-whole", {}, 0
-    for each in (whole, folder / f"{name}-warm"):  # the first compiles kernels
+    for each in (whole, folder / f"{name}-warm"):  # the first run compiles kernels
         each.mkdir()
         code, seconds = timed(case.begin(each, again=False).wait)
         assert code == 0, f"{name} does not work"
@@ -95,17 +96,17 @@ def killed(name: str, case: Case, kills: int, folder: Path, rng: np.random.Gener
         differ += sum(found.get(path) != each for path, each in expected.items())
     return {
         "killed": name,
-        "times": count,
+        "kills": count,
         "s without kills": seconds,
-        "came to its end": ended,
-        "exit code then, at most": max(codes, default=0),
+        "completed": ended,
+        "largest exit code": max(codes, default=0),
         "files": len(expected) * ended,
         "files that differ": differ,
     }
 
 
 def captures(kills: int, folder: Path, rng: np.random.Generator) -> dict[str, object]:
-    """Captures that are killed while frames come: a row of the table."""
+    """Kill captures while frames arrive; return a row of the table."""
     config, _ = load_config("radarize")
     played, lost, wrong = record(folder / "played.h5", config, 32), [], 0
     for number in range(kills):
@@ -129,16 +130,16 @@ def captures(kills: int, folder: Path, rng: np.random.Generator) -> dict[str, ob
             wrong += int((kept.adc(0, len(kept)) != sent).any(axis=(1, 2, 3, 4, 5)).sum())
         output.unlink()
     return {
-        "killed": "capture, rescued by radarize recover",
-        "times": kills,
+        "killed": "capture, recovered by radarize recover",
+        "kills": kills,
         "frames that differ": wrong,
-        "lost, s, at most": max(lost),
-        "lost, s, mean": float(np.mean(lost)),
+        "lost, max, s": max(lost),
+        "lost, mean, s": float(np.mean(lost)),
     }
 
 
 def cases(folder: Path) -> dict[str, Case]:
-    """The commands; each takes what one before it has made without kills."""
+    """Return the commands; each uses the results of earlier ones without kills."""
     (folder / "kills.yaml").write_text(yaml.safe_dump(SPECIFICATION))
     data = folder / "dataset-whole"
     walk = data / "office_cart_00.h5"
@@ -155,7 +156,7 @@ def cases(folder: Path) -> dict[str, Case]:
 
 
 def rows(kills: int, seed: int, folder: Path, wanted: Callable[[str], bool] = lambda name: True) -> list[dict]:
-    """Of the table, those that are wanted."""
+    """Return the selected rows of the table."""
     rng, found = np.random.default_rng(seed), []
     for name, case in cases(folder).items():
         if wanted(name) or name == "dataset":
@@ -166,13 +167,13 @@ def rows(kills: int, seed: int, folder: Path, wanted: Callable[[str], bool] = la
 
 
 @script(
-    "Kills at random moments",
-    kills=(50, "of each command"),
-    seed=(0, "of their moments"),
-    only=(str, "this one alone, and what it takes, without a table"),
+    "Kills at random times",
+    kills=(50, "number of kills of each command"),
+    seed=(0, "seed of their times"),
+    only=(str, "run only this command, without a table"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """The table."""
+    """Run all commands with kills."""
     with tempfile.TemporaryDirectory() as folder:
         found = rows(options.kills, options.seed, Path(folder), lambda name: options.only in (None, name))
     if options.only:
@@ -182,12 +183,11 @@ def main(options: argparse.Namespace) -> Page:
         same(found),
         data=Data("two walks of half a second in a simulated office, and noise", (), options.seed),
         notes=[
-            "SIGKILL to the command and all that it has started, at moments drawn evenly from the time that it takes "
-            "with warm kernels; then it is begun again. Where it comes to its end first, it begins anew in another "
-            "folder; after the last kill it is let through. A capture is killed "
-            f"{LIVES[0]:g}-{LIVES[1]:g} s after its file is there; "
-            "frames lost are those from then on that the rescued recording lacks.",
-            "Compared are bytes: of all recordings, of trajectories and map, of the trained network; and the figures "
+            "SIGKILL to the command and all of its processes, at a random time, uniform over its run time with "
+            "compiled kernels; then it is restarted. If it ends before the kill, it is started in another folder; "
+            f"after the last kill it runs to its end. A capture is killed {LIVES[0]:g}-{LIVES[1]:g} s after its file "
+            "exists; lost: frames since then that are missing in the recovered recording.",
+            "Compared are the bytes of all recordings, trajectories, the map and the trained network, and the figures "
             "of the benchmark's table.",
             surroundings(),
         ],

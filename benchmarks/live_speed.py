@@ -1,7 +1,7 @@
-"""`radarize live` on a replay in real time, somebody looking on: frames dropped, and what a frame costs; and at the
-virtual radar, while it records, with a browser on its page, all of this on one machine.
+"""Speed of `radarize live`: dropped frames and run time per frame, on a replay in real time with a client on its page,
+and with the virtual radar, recording, and a browser on one machine.
 
-Wall time says whether this machine keeps up with whatever else it does; processor time what it takes of a free one.
+Wall time shows whether this machine keeps up with its other load; processor time is the load on an idle machine.
 """
 
 import argparse
@@ -33,14 +33,14 @@ from tests.virtual import emulator
 
 
 def look_on(url: str) -> None:
-    """Take events as a browser does, until they end."""
+    """Read the events of the page as a browser does, until they end."""
     with urllib.request.urlopen(url + "events") as events:
         while events.read1(1 << 16):
             pass
 
 
 def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
-    """One replay; a row of the table."""
+    """Run one replay; return a row of the table."""
     stream = Replay(path)
     every = pace(methods["odometry"], stream.config)
     inputs, watch = prepare(Inputs(stream.config, every=every), methods), Stopwatch()
@@ -78,7 +78,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
 
 
 def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
-    """A session at the virtual radar, which plays a recording again and again; a row of the table."""
+    """Run a session with the virtual radar, which repeats a recording; return a row of the table."""
     output, config = folder / "live.h5", Replay(path).config
     (best, _), losses = best_methods(config), Losses()
     with emulator(path, folder, "--loop") as board:
@@ -91,18 +91,18 @@ def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
         with subprocess.Popen([*map(str, command)], text=True, **streams) as session:
             url = re.match(r"page: (\S+)", session.stdout.readline())[1]
             with Browser(url, folder / "profile"):
-                said, warned = session.communicate()
+                output, warnings = session.communicate()
     with Recording(output) as recording:
         for where, _ in recording.batches(64):
             losses.add(recording.valid(where.start, where.stop))
-    dropped = re.search(r"(\d+) of \d+ frames were dropped", warned)
+    dropped = re.search(r"(\d+) of \d+ frames were dropped", warnings)
     return {
         "odometry, scans": f"{best['odometry']}, {best['scans']}, all together",
         "follows": _follows(pace(best["odometry"], config)),
         "dropped": f"{dropped[1] if dropped else 0} of {frames}",
         "not recorded": frames - losses.frames,
         "chirps lost": losses.lost_chirps,
-        "ms a frame": float(re.search(r"frames, (\S+) ms each", said)[1]),
+        "ms a frame": float(re.search(r"frames, (\S+) ms each", output)[1]),
         "budget, ms": 1e3 * config.frame_period,
     }
 
@@ -113,10 +113,10 @@ def _follows(every: int) -> str:
 
 @script(
     "radarize live in real time, preset radarize",
-    duration=(20.0, "of the simulated recording, s"),
-    frames=(9000, "of the session at the virtual radar; 0: none"),
-    seed=(0, "of it"),
-    recording=(Path, "a recording; by default one is simulated", {"nargs": "?"}),
+    duration=(20.0, "duration of the simulated recording, s"),
+    frames=(9000, "frames of the session with the virtual radar; 0: none"),
+    seed=(0, "seed of the simulated recording"),
+    recording=(Path, "recording; by default one is simulated", {"nargs": "?"}),
 )
 def main(options: argparse.Namespace) -> Page:
     with tempfile.TemporaryDirectory() as folder:
@@ -133,10 +133,10 @@ def main(options: argparse.Namespace) -> Page:
         data=data,
         networks=Networks().used([kind for pair in chosen for kind in pair.networks]),
         notes=[
-            "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
-            "because this machine was too slow for them; processor time is that of the main process.",
-            "All together: `radarsim emulate` plays the recording over UDP again and again, `live` follows and "
-            "records, and headless Chromium shows its page.",
+            "A client reads the events of the page. dropped: frames that were left out because this machine was too "
+            "slow; processor ms per frame: of the main process.",
+            "all together: `radarsim emulate` repeats the recording over UDP, `live` estimates and records, and "
+            "headless Chromium shows its page.",
             surroundings(),
         ],
     )

@@ -1,11 +1,11 @@
-"""All pages of results, as `pages.yaml` lists them.
+"""Make the pages of results that are listed in `pages.yaml`.
 
-    python -m benchmarks.make                 # or `make results`; python -m benchmarks.make walks scans: these alone
-    python -m benchmarks.make --smoke         # a short trial of every part, in build/smoke; its figures mean nothing
+    python -m benchmarks.make                 # or `make results`; python -m benchmarks.make walks scans: these pages
+    python -m benchmarks.make --smoke         # a short trial of every part, in build/smoke; its figures are meaningless
 
-Recordings are made first, then the parts of each page, each in a process of its own; then the page is written from its
-parts. Whatever ends it, the same command goes on: a part that was made at this commit by the same command is kept. A
-part whose data are not there is left out, and its page says so.
+Recordings are made first, then the parts of each page, each in a separate process; then the page is written from its
+parts. If it is interrupted, the same command continues: a part that was made at this commit by the same command is
+kept. A part without its data is left out, and listed on its page.
 """
 
 import argparse
@@ -30,23 +30,23 @@ from radarsim.world.importers import import_scene
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-#: Lidar logs by the name of the building that is made of them.
+#: Lidar logs by the name of the building that is made from them.
 PLANS = {name: SHARED / "radish" / f"{name}-corrected.log.gz" for name in ("intel", "orebro")}
-#: Of a short trial: recordings of a data set, and s of each.
+#: Short trial: recordings of a data set, and their duration, s.
 FEW, SHORT = 2, 2.0
 PAGES: dict[str, dict[str, Any]] = yaml.safe_load((HERE / "pages.yaml").read_text())
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where things are and how they are made.
+    """Folders and options.
 
     Attributes:
-        parts: folder of the parts; pages stand beside it.
+        parts: folder of the parts; pages are written to its parent.
         work: folder of recordings and runs.
         radarhd: ``dataset_5`` of a clone of RadarHD's repository.
-        smoke: a short trial.
-        workers: processes.
+        smoke: whether it is a short trial.
+        workers: number of processes.
         ray: address of a Ray cluster to use instead, for recordings and `radarize benchmark`.
     """
 
@@ -59,25 +59,25 @@ class Place:
 
     @property
     def spread(self) -> list[str]:
-        """Options of commands that use several processes."""
+        """Options of commands with several processes."""
         return ["--ray", self.ray] if self.ray else ["--workers", str(self.workers)] if self.workers else []
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a page: a name, and what `pages.yaml` says of it."""
+    """A part of a page: its name, and its entry in `pages.yaml`."""
 
     name: str
     about: dict[str, Any]
 
     def make(self, place: Place) -> str:
-        """Make the part, unless it is there; say why it cannot be.
+        """Make the part, unless it is up to date; return a sentence if its data is missing.
 
         Raises:
             InputError: its command fails.
         """
         if self.about.get("needs") == "radarhd" and not place.radarhd.is_dir():
-            return f"Left out: {self.name}, for there is no clone of RadarHD's repository (--radarhd)."
+            return f"Left out: {self.name}, because there is no clone of RadarHD's repository (--radarhd)."
         data = [recordings(name, place) for name in self._sets()]
         benchmark, words = self.about.get("benchmark"), self._words(place)
         if benchmark is None:
@@ -90,19 +90,19 @@ class Part:
         if self._made(command, place):
             return ""
         if subprocess.run(command, cwd=ROOT).returncode:
-            raise InputError(f"{self.name}: {shlex.join(command)} failed, and says above why")
+            raise InputError(f"{self.name}: {shlex.join(command)} failed with the error above")
         if benchmark is not None:
             self._take(benchmark, out, place)
         write_whole(self._stamp(place), self._state(command) + "\n")
         return ""
 
     def read(self, place: Place) -> Results | None:
-        """What it found; None if it was never made."""
+        """Read the results of the part; None if it does not exist."""
         path = place.parts / f"{self.name}.json"
         return Results.read(path) if path.is_file() else None
 
     def _sets(self) -> list[str]:
-        """Data sets that it reads; of a folder, all of its specifications."""
+        """Return the data sets that the part reads; for a folder, all of its specifications."""
         name = self.about.get("data") or self.about.get("simulated")
         if name is None or not name.endswith("/"):
             return [name] if name else []
@@ -127,7 +127,7 @@ class Part:
         return there and stamp.read_text().strip() == self._state(command)
 
     def _take(self, benchmark: str, out: Path, place: Place) -> None:
-        """Take over what `radarize benchmark` wrote, with its picture."""
+        """Copy the results of `radarize benchmark`, with the picture."""
         results = Results.read(out / f"{benchmark}.json")
         place.parts.mkdir(parents=True, exist_ok=True)
         if (picture := out / f"{benchmark}.png").is_file():
@@ -138,12 +138,12 @@ class Part:
 
 
 def common(folders: list[Path]) -> Path:
-    """The folder of a data set, or the one that has several in it."""
+    """Return the folder of a data set, or the common folder of several."""
     return folders[0] if len(folders) == 1 else folders[0].parent
 
 
 def recordings(name: str, place: Place) -> Path:
-    """The recordings of a data set, made as far as they are not there; a few short ones for a short trial."""
+    """Make the missing recordings of a data set, or a few short ones for a short trial; return their folder."""
     folder, plans = place.work / "data" / name, place.work / "plans"
     plans.mkdir(parents=True, exist_ok=True)
     source = next(beside for beside in (HERE, ROOT / "scenes" / "datasets") if (beside / f"{name}.yaml").is_file())
@@ -160,7 +160,7 @@ def recordings(name: str, place: Place) -> Path:
 
 
 def shortened(specification: str) -> str:
-    """A few short recordings of a data set."""
+    """Reduce a specification to a few short recordings."""
     about = yaml.safe_load(specification)
     about["recordings"] = [each | {"duration": SHORT, "count": 1} for each in about["recordings"][:FEW]]
     for each in about["recordings"]:
@@ -170,7 +170,7 @@ def shortened(specification: str) -> str:
 
 
 def page(name: str, parts: dict[str, Results], missing: list[str]) -> str:
-    """A page's text: what it asks, and each part with what it is of."""
+    """Return the text of a page: its question, and the tables of each part with their provenance."""
     about = PAGES[name]
     lines = [f"# {about['title']}", "", about["asks"], ""]
     for results in parts.values():
@@ -183,7 +183,7 @@ def page(name: str, parts: dict[str, Results], missing: list[str]) -> str:
 
 
 def write(name: str, place: Place, missing: list[str]) -> Path:
-    """Write a page from its parts as they are there."""
+    """Write a page from its existing parts."""
     parts = {part: Part(part, about).read(place) for part, about in PAGES[name]["parts"].items()}
     there = {part: results for part, results in parts.items() if results is not None}
     return write_whole(place.parts.parent / f"{name}.md", page(name, there, missing))
@@ -193,11 +193,11 @@ def main() -> None:
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("pages", nargs="*", metavar="PAGE", help=", ".join(PAGES))
     words.add_argument("--smoke", action="store_true", help="a short trial")
-    words.add_argument("--work", type=Path, help="folder of recordings and runs (build/results, build/smoke)")
-    words.add_argument("--radarhd", type=Path, default=Path("RadarHD/dataset_5"), help="a clone's data set")
-    words.add_argument("--workers", type=int, help="processes; one per core by default")
+    words.add_argument("--work", type=Path, help="folder of recordings and runs; build/results or build/smoke")
+    words.add_argument("--radarhd", type=Path, default=Path("RadarHD/dataset_5"), help="data set in RadarHD's clone")
+    words.add_argument("--workers", type=int, help="number of processes; one per core by default")
     words.add_argument("--ray", help="address of a Ray cluster to use instead")
-    words.add_argument("--write", action="store_true", help="only write pages from the parts that are there")
+    words.add_argument("--write", action="store_true", help="only write pages from the existing parts")
     given = words.parse_args()
     if unknown := [name for name in given.pages if name not in PAGES]:
         words.error(f"page is {unknown[0]!r}, expected some of: {', '.join(PAGES)}")

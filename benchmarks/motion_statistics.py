@@ -1,4 +1,4 @@
-"""How the platforms move, beside the figures of the paper's data set, over buildings of all styles."""
+"""Motion statistics of the platforms in buildings of all styles, and those of the paper's data set."""
 
 import argparse
 import time
@@ -15,7 +15,7 @@ from radarsim.motion.statistics import Statistics
 from radarsim.world.scene import Scene
 
 DURATION = 60.0
-#: What the paper says of its platforms and data set; the gaps it leaves are "-".
+#: Statistics of the paper's platforms and data set.
 THEIRS = {
     "handheld": {"distance": "over 50", "top": "up to 1.6", "ways": "forward, backward, sideways, fast turns"},
     "cart": {"distance": "over 50", "top": "up to 1.6", "ways": "mostly constant, slow turns; forward and backward"},
@@ -24,7 +24,7 @@ THEIRS = {
 
 
 def walks(count: int, seed: int) -> pd.DataFrame:
-    """Statistics of one walk of each platform through some buildings, with the CPU time of planning, s."""
+    """Return statistics of one walk of each platform through each building, with the CPU time of planning, s."""
     rng, found = np.random.default_rng(seed), []
     for number in track(range(count), "buildings"):
         building = {"kind": "ABCD"[number % 4], "seed": int(rng.integers(10_000)), "floor": int(rng.integers(4))}
@@ -39,7 +39,7 @@ def walks(count: int, seed: int) -> pd.DataFrame:
 
 
 def row(platform: str, walks: pd.DataFrame) -> dict[str, object]:
-    """Means over the walks, or the extreme where it says so."""
+    """Return a row of means, or extremes where named so, over the walks of a platform."""
     figures, paper = walks.drop(columns=["platform", "walk"]), THEIRS[platform]
     mean, top, least = figures.mean(), figures.max(), figures.min()
     ways = mean[["forward", "backward", "sideways", "standing"]]
@@ -60,12 +60,12 @@ def row(platform: str, walks: pd.DataFrame) -> dict[str, object]:
 
 
 @script(
-    f"How the platforms move in {DURATION:.0f} s, and in the paper's data set",
-    buildings=(20, "walked through"),
-    seed=(0, "that they are drawn from"),
+    f"Motion statistics of the platforms over {DURATION:.0f} s, and of the paper's data set",
+    buildings=(20, "number of buildings"),
+    seed=(0, "seed of the buildings"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """Walk and publish."""
+    """Plan the walks."""
     found = walks(options.buildings, options.seed)
     took = found["took"]
     return Page(
@@ -73,10 +73,11 @@ def main(options: argparse.Namespace) -> Page:
         data=Data("planned walks", tuple(found["walk"]), options.seed),
         beside=[PAPER],
         notes=[
-            "One walk per platform through each building of styles A to D; distance is the sensor's, over the ground.",
-            "The paper gives its means over trajectories of about a minute: over 50 m by hand and on the cart, about "
-            "20 m on the robot. Its totals, 4,680 m in 226,800 frames at 30 Hz, are 32 m in 52 s per trajectory, "
-            "less than those means would give.",
-            f"Planning a walk takes {took.median():.2f} s of CPU time (median, at most {took.max():.2f} s).",
+            "One walk per platform through each building of styles A to D; distance: path length of the sensor in the "
+            "horizontal plane.",
+            "The paper states means over trajectories of about a minute: over 50 m (handheld, cart), about 20 m "
+            "(robot). Its totals, 4,680 m in 226,800 frames at 30 Hz, are 32 m in 52 s per trajectory, less than "
+            "these means.",
+            f"CPU time of planning a walk: median {took.median():.2f} s, maximum {took.max():.2f} s.",
         ],
     )

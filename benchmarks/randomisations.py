@@ -1,8 +1,8 @@
-"""Which randomisations a network needs that is trained on simulated walks alone and works on real ones: each is left
-out once.
+"""Ablation of the randomisations in the training of a network on simulated walks, which is evaluated on real walks:
+each randomisation is left out once.
 
-Real walks are training walks, so that nothing is chosen on test walks; points are judged by instant
-(`radarize.baselines.walks.clock`). The networks are smaller, and trained for less, than the shipped one.
+Real walks are training walks, so that nothing is chosen on test walks; frames are matched by time
+(`radarize.baselines.walks.clock`). The networks are smaller than the shipped one, and trained with fewer steps.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from radarize.baselines.pictures.network import PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.training import DENSE, Pictures
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.baselines.walks.walks import FIRST, Walk
 from radarize.evaluation.benchmark.choices import TRAINING
 from radarize.io.jobs import Report
@@ -36,9 +36,9 @@ from radarize.learning.task import Settings
 from radarize.learning.training.dataset import recordings
 from radarsim.world.description import shipped
 
-#: Frames of a window, as the shipped network has them.
+#: Frames of a window, as in the shipped network.
 WINDOW = Pictures.defaults.frames
-#: dB, as good as nothing; m, the middle of what the radar reads too far.
+#: A negligible level, dB; the mean range offset of the radar, m.
 _NONE, _BIAS = -200.0, sum(training.BIAS) / 2
 
 
@@ -46,10 +46,10 @@ class Variant(NamedTuple):
     """A training.
 
     Attributes:
-        left_out: values that stand in place of those of `roughening` or `training`.
-        walks: what simulated walks must be: kind, clutter, unevenness, platform.
-        share: of these that are taken.
-        seed: of weights, order and augmentation.
+        left_out: values that replace constants of `roughening` or `training`.
+        walks: required attributes of simulated walks: kind, clutter, unevenness, platform.
+        share: share of these walks that is used.
+        seed: seed of weights, order and augmentation.
     """
 
     left_out: dict[str, object] = {}  # noqa: RUF012
@@ -61,30 +61,30 @@ class Variant(NamedTuple):
 EVERYTHING, QUARTER = "everything", "a quarter of the walks"
 SUBSETS = {
     "clutter of one density, a quarter": Variant(walks={"clutter": 1}),
-    "even walls alone, a quarter": Variant(walks={"unevenness": 0}, share=0.8),
+    "flat walls only, a quarter": Variant(walks={"unevenness": 0}, share=0.8),
     "buildings of one style, a quarter": Variant(walks={"kind": "A"}),
-    "by cart alone, a quarter": Variant(walks={"platform": "cart"}, share=0.5),
+    "cart walks only, a quarter": Variant(walks={"platform": "cart"}, share=0.5),
 }
 VARIANTS = {
     EVERYTHING: Variant(),
     f"{EVERYTHING}, another seed": Variant(seed=1),
-    "no other boards (gains, phases, yaw)": Variant({"GAIN": 0.0, "PHASE": 0.0, "YAW": 0.0}),
-    "no flashes that lose": Variant({"CEILING": (100.0, 100.0)}),
-    "no echoes that nobody explains": Variant({"LEVELS": (_NONE, _NONE)}),
-    "no gain that wanders over range": Variant({"TILT": 0.0, "PATCHY": 0.0}),
+    "no channel errors (gains, phases, yaw)": Variant({"GAIN": 0.0, "PHASE": 0.0, "YAW": 0.0}),
+    "no limit of specular reflections": Variant({"CEILING": (100.0, 100.0)}),
+    "no additional echoes": Variant({"LEVELS": (_NONE, _NONE)}),
+    "no gain variation over range": Variant({"TILT": 0.0, "PATCHY": 0.0}),
     "no noise": Variant({"NOISE": (_NONE, _NONE)}),
-    "no missing cells": Variant({"MISSING": 0.0}),
-    "always a tenth of the cells": Variant({"KEPT": (0.1, 0.1)}),
-    "one range bias": Variant({"BIAS": (_BIAS, _BIAS)}),
-    "no zoom": Variant({"ZOOM": 0.0}),
-    "no turns": Variant({"TURN": 0}),
+    "no deleted cells": Variant({"MISSING": 0.0}),
+    "constant share of kept cells, 10 %": Variant({"KEPT": (0.1, 0.1)}),
+    "constant range bias": Variant({"BIAS": (_BIAS, _BIAS)}),
+    "no scaling": Variant({"ZOOM": 0.0}),
+    "no rotation": Variant({"TURN": 0}),
     QUARTER: Variant(share=0.26),
     **SUBSETS,
 }
 
 
 class Real(NamedTuple):
-    """Windows of real pictures, and what the lidar saw at the instant of the newest."""
+    """Windows of real pictures, with the lidar's picture at the time of the newest frame."""
 
     walk: list[int]
     pictures: UInt8[np.ndarray, "item frame range azimuth"]
@@ -92,7 +92,7 @@ class Real(NamedTuple):
 
 
 def real(walks: list[Walk], every: int) -> Real:
-    """Windows of walks."""
+    """Read windows of real walks."""
     found = Real([], [], [])
     for walk in walks:
         partners = Clock.of(walk).partners(walk.frames)
@@ -105,7 +105,7 @@ def real(walks: list[Walk], every: int) -> Real:
 
 
 def chosen(data: Path, variant: Variant) -> tuple[Path, ...]:
-    """Simulated walks of a variant."""
+    """Select the simulated walks of a variant."""
     specification = read_yaml(shipped() / "datasets" / "radarhd.yaml")
     found = []
     for path in recordings(data):
@@ -120,12 +120,12 @@ def chosen(data: Path, variant: Variant) -> tuple[Path, ...]:
 
 @cache
 def table(paths: tuple[Path, ...]) -> FeatureTable:
-    """Simulated walks in memory."""
+    """Read simulated walks into memory."""
     return Pictures().table(paths)
 
 
 def trained(known: FeatureTable, settings: Settings, steps: int, report: Report) -> PictureNet:
-    """A network after so many steps."""
+    """Train a network for a number of steps."""
     task, rng = Pictures(), np.random.default_rng(settings.seed)
     torch.manual_seed(settings.seed)
     net, generator = task.net(settings, known.grid).train(), torch.Generator().manual_seed(settings.seed)
@@ -147,13 +147,13 @@ def trained(known: FeatureTable, settings: Settings, steps: int, report: Report)
 
 @torch.inference_mode()
 def judged(net: PictureNet, windows: Real) -> dict[int, float]:
-    """Median Chamfer distance of each walk, m, with that density of points that is best for all of them."""
-    apart = {dense: [] for dense in DENSE}
+    """Return the median Chamfer distance of each walk, m, with the density of points that is best over all walks."""
+    distances = {dense: [] for dense in DENSE}
     for pictures, lidar in zip(windows.pictures, windows.lidar, strict=True):
         likely = net.estimate(torch.from_numpy(pictures)[None, :, None].float())
-        for dense, found in apart.items():
-            found.append(Apart.of_pictures(points(likely, dense)[0].numpy(), lidar).chamfer)
-    best = min(apart.values(), key=np.nanmedian)
+        for dense, found in distances.items():
+            found.append(PointCloudDistance.of_pictures(points(likely, dense)[0].numpy(), lidar).chamfer)
+    best = min(distances.values(), key=np.nanmedian)
     walks = np.array(windows.walk)
     return {int(walk): float(np.nanmedian(np.array(best)[walks == walk])) for walk in np.unique(walks)}
 
@@ -161,7 +161,7 @@ def judged(net: PictureNet, windows: Real) -> dict[int, float]:
 def tried(
     variant: Variant, paths: tuple[Path, ...], windows: Real, settings: Settings, steps: int, report: Report
 ) -> dict[int, float]:
-    """A variant, trained and judged."""
+    """Train and evaluate a variant."""
     with ExitStack() as stack:
         for name, value in variant.left_out.items():
             module = next(each for each in (roughening, training) if hasattr(each, name))
@@ -170,14 +170,14 @@ def tried(
 
 
 @script(
-    "What simulated walks must vary",
+    "Ablation of randomisations",
     data=CLONE,
-    simulated=(Path("radarhd"), "what `radarsim dataset radarhd` made"),
-    steps=(500, "of each training"),
-    every=(40, "of so many frames of the real walks one is judged"),
+    simulated=(Path("radarhd"), "data set made by `radarsim dataset radarhd`"),
+    steps=(500, "steps of each training"),
+    every=(40, "every N-th frame of the real walks is evaluated"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """Train and judge all, beside each other."""
+    """Train and evaluate all variants in parallel."""
     walks = [Walk.find(options.data, number) for number in TRAINING]
     windows, settings = real(walks, options.every), Settings(width=8, frames=WINDOW, batch=16, rate=2e-3)
     paths = {name: chosen(options.simulated, variant) for name, variant in VARIANTS.items()}
@@ -185,21 +185,22 @@ def main(options: argparse.Namespace) -> Page:
         name: partial(tried, each, paths[name], windows, settings, options.steps) for name, each in VARIANTS.items()
     }
     found, rows = dict(zip(jobs, performed(jobs, None, "trainings"), strict=True)), []
-    for name, apart in found.items():
-        beside = found[QUARTER if name in SUBSETS else EVERYTHING]
-        worse = np.array([apart[walk] - beside[walk] for walk in apart])
+    for name, each in found.items():
+        reference = found[QUARTER if name in SUBSETS else EVERYTHING]
+        worse = np.array([each[walk] - reference[walk] for walk in each])
         rows.append({
-            "training": name, "simulated walks": len(paths[name]), "chamfer_m": float(np.mean(list(apart.values()))),
-            "worse by_m": float(worse.mean()), "+-": float(worse.std(ddof=1) / np.sqrt(len(worse))),
+            "training": name, "simulated walks": len(paths[name]), "chamfer_m": float(np.mean(list(each.values()))),
+            "increase_m": float(worse.mean()), "+-": float(worse.std(ddof=1) / np.sqrt(len(worse))),
         })  # fmt: skip
     return Page(
         rows,
         data=radarhd("RadarHD's training walks", walks),
         notes=[
-            "Median Chamfer distance of a real walk's points from the lidar's of the same instant, m, mean over walks. "
-            f"Worse by: than `{EVERYTHING}`, walk by walk, or than `{QUARTER}` where walks are left out; +-: standard "
-            "error over walks. Another seed says by how much two trainings of one kind differ.",
-            f"Each network has width {settings.width} and was trained on simulated walks alone, {options.steps} steps "
-            f"of {settings.batch} windows; the density of points is the best for these walks.",
+            "chamfer_m: median Chamfer distance of a real walk's points from the lidar's, matched by time, m, mean "
+            f"over walks. increase_m: mean difference to `{EVERYTHING}` on the same walks, or to `{QUARTER}` for "
+            "subsets of the simulated walks; +-: standard error over walks. `another seed` shows the difference "
+            "between two trainings with the same settings.",
+            f"Each network has width {settings.width} and was trained on simulated walks only, for {options.steps} "
+            f"steps of {settings.batch} windows; the density of points is the best on these walks.",
         ],
     )

@@ -1,5 +1,5 @@
-"""What all scripts share: their options, and how they write what they found, with all that
-`radarize.evaluation.benchmark.results` wants it to say. `benchmarks.make` joins what several found to a page."""
+"""Common parts of all scripts: their options, and their results with provenance
+(`radarize.evaluation.benchmark.results`). `benchmarks.make` combines the results of several scripts to a page."""
 
 import argparse
 import inspect
@@ -21,27 +21,27 @@ from radarize.io.jobs import Job, perform
 from radarsim.motion.statistics import Statistics
 from radarsim.motion.trajectory import Motion
 
-#: Of what scripts and `radarize benchmark` found, a JSON file each.
+#: Folder of the results of scripts and of `radarize benchmark`, a JSON file each.
 PARTS = Path(__file__).parent / "results" / "parts"
-#: Captures and logs that others made, beside the checkout.
+#: Public captures and logs, beside the checkout.
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
-#: Options of scripts that judge real walks.
-CLONE = Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"
-POSES = "", "folder of poses, WALK.tum; by the lidar if none"
+#: Options of scripts that evaluate real walks.
+CLONE = Path("RadarHD/dataset_5"), "data set in a clone of RadarHD's repository"
+POSES = "", "folder of true poses, WALK.tum; estimated from the lidar if empty"
 T = TypeVar("T")
-machine()  # as things are now: sources may change while a script runs
+machine()  # read now, because sources may change while a script runs
 
 
 class Page(NamedTuple):
-    """What a script publishes.
+    """Results of a script.
 
     Attributes:
-        rows: a mapping a row, same keys.
-        data: that the figures are of.
+        rows: rows of the table, with the same keys.
+        data: data of the results.
         notes: sentences below the table.
-        networks: that the figures are of.
-        beside: whose figures stand beside ours.
-        figure: of them; None: there is none.
+        networks: networks that were used.
+        beside: published results that are shown in the table.
+        figure: figure of the results, or None.
     """
 
     rows: Sequence[Mapping[str, object]]
@@ -53,14 +53,14 @@ class Page(NamedTuple):
 
 
 def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], None]]:
-    """Make a script of the function below, the last one of its file, from options to what is published.
+    """Make a script of the decorated function, the last one of its file, which returns results for options.
 
-    What it found is written under the file's name, and printed. `main.parser` has the options.
+    Results are written under the name of the file, and printed. `main.parser` has the options.
 
     Args:
         title: heading.
-        options: by name a default, or the type of one that has none; what it is; and more for `add_argument`. False
-            stands for a flag, and ``{"nargs": "?"}`` makes a positional argument.
+        options: by name: default, or type of an option without one; help text; further arguments of `add_argument`.
+            False makes a flag, and ``{"nargs": "?"}`` a positional argument.
     """
 
     def of(work: Callable[[argparse.Namespace], Page | tuple[Results, Figure] | None]) -> Callable[[], None]:
@@ -97,7 +97,7 @@ def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], No
 
 
 def typed(name: str) -> str:
-    """The command that a script was begun with; where it writes is the machine's business."""
+    """Return the command of this script, without its output folder."""
     words = [*sys.argv]
     if "--out" in words:
         del words[(at := words.index("--out")) : at + 2]
@@ -105,7 +105,7 @@ def typed(name: str) -> str:
 
 
 def tracked(items: Sequence[T], title: str) -> Iterator[T]:
-    """Go through items and show how many are done."""
+    """Iterate over items with a progress bar."""
     with progress(title) as report:
         for done, item in enumerate(items):
             report(done, len(items))
@@ -114,16 +114,16 @@ def tracked(items: Sequence[T], title: str) -> Iterator[T]:
 
 
 def same(rows: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
-    """Rows with the columns of all of them."""
+    """Return rows with the union of their columns."""
     columns = dict.fromkeys(column for row in rows for column in row)
     return [{column: row.get(column) for column in columns} for row in rows]
 
 
 def performed(jobs: Mapping[str, Job], workers: int | None, title: str) -> list:
-    """Of all jobs, in their order.
+    """Execute jobs in processes, and return their results in order.
 
     Raises:
-        InputError: one of them fails.
+        InputError: a job fails.
     """
     found = {}
     with progress(title) as report:
@@ -137,34 +137,34 @@ def performed(jobs: Mapping[str, Job], workers: int | None, title: str) -> list:
 
 
 def radarhd(title: str, walks: Sequence) -> Data:
-    """Data of RadarHD's walks (`radarize.baselines.walks.walks.Walk`)."""
+    """Return the description of RadarHD's walks (`radarize.baselines.walks.walks.Walk`)."""
     return Data(title, tuple(NamedWalk.radarhd(walk.number) for walk in walks))
 
 
 def walked(scene: str, seed: int, motion: Motion) -> NamedWalk:
-    """A simulated walk of which no recording was made."""
+    """Return the description of a simulated walk without a recording."""
     return NamedWalk(scene, seed, Statistics.of(motion).distance, simulated=True)
 
 
 def timed(work: Callable[..., T], *arguments: object) -> tuple[T, float]:
-    """What some work gives, and the s that it took."""
+    """Call a function; return its result and its run time, s."""
     start = time.perf_counter()
     return work(*arguments), time.perf_counter() - start
 
 
 def peak_memory_mb() -> float:
-    """Largest resident size of this process so far, MB."""
+    """Return the peak resident size of this process, MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def memory_mb() -> float:
-    """Resident size of this process now, MB."""
+    """Return the resident size of this process, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 1e6
 
 
 def surroundings() -> str:
-    """What else the machine does, and at what priority (Linux: of the session) figures are taken: a note."""
+    """Return a note on the load of the machine, and on the priority of the measurement (Linux: of the session)."""
     group = Path("/proc/self/autogroup")
     priority = group.read_text().split(maxsplit=1)[1].strip() if group.exists() else "that of any process"
     return (

@@ -1,6 +1,7 @@
-"""How making a data set scales: one process, one per core, and Ray with two nodes of one core each, one of which dies.
+"""Scaling of data sets: one process, one per core, and Ray with two nodes of one core each, without and with a lost
+node.
 
-The nodes are real Ray workers on this machine, each with a raylet of its own. What all ways make is compared byte by
+The nodes are Ray workers on this machine, each with its own raylet. The recordings of all runs are compared byte by
 byte.
 """
 
@@ -23,14 +24,14 @@ from radarsim.dataset.specification import Specification
 if TYPE_CHECKING:
     from ray.cluster_utils import Cluster
 
-#: Walks of one length, so that workers end together.
+#: Buildings of walks of equal duration, so that workers end together.
 BUILDINGS = {kind: {"kind": kind, "seed": 8100} for kind in "ABCD"}
 NODES = 2
 
 
 @contextmanager
 def cluster() -> Iterator["Cluster"]:
-    """Ray with a head without cores, and two nodes of one core each."""
+    """Start Ray with a head without cores, and two nodes of one core each."""
     os.environ |= {
         "RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0", "PYTHONPATH": os.pathsep.join(sys.path)
     }  # fmt: skip
@@ -48,7 +49,7 @@ def cluster() -> Iterator["Cluster"]:
 
 
 def dying(nodes: "Cluster", at: float) -> Callable[[int, int], None]:
-    """Progress at whose given share a node is lost, for which another one comes."""
+    """Return a progress function that replaces a node at a given share."""
     worker = [node for node in nodes.list_all_nodes() if node is not nodes.head_node][-1]
     lost: list[bool] = []
 
@@ -62,14 +63,14 @@ def dying(nodes: "Cluster", at: float) -> Callable[[int, int], None]:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """Of each recording."""
+    """Return a digest of each recording."""
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.glob("*.h5"))}
 
 
 @script(
     "Data sets over processes and machines",
-    seconds=(20.0, "of each of eight walks"),
-    seed=(8100, "of the walks"),
+    seconds=(20.0, "duration of each of eight walks, s"),
+    seed=(8100, "seed of the walks"),
 )
 def main(options: argparse.Namespace) -> Page:
     walks = [{"building": kind, "floors": [0], "platform": ["handheld", "cart"], "count": 1,
@@ -102,9 +103,9 @@ def main(options: argparse.Namespace) -> Page:
         rows,
         data=data,
         notes=[
-            f"{len(found['one process'])} recordings, {frames} frames. Efficiency: times as fast as one process, over "
-            "workers; start of processes included. One process has all cores for its threads, several share them.",
-            "Where a node is lost, its recording is begun again on another one, from the last frame that was written.",
+            f"{len(found['one process'])} recordings, {frames} frames. efficiency: speed-up over one process divided "
+            "by the number of workers, including the start of processes. One process uses all cores by threads.",
+            "After the loss of a node, its recording is continued on another one, from the last written frame.",
             surroundings(),
         ],
     )

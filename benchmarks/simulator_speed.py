@@ -1,7 +1,7 @@
-"""How fast the simulator is, and how exact, on three scenes with the `radarize` preset.
+"""Speed and accuracy of the simulator on three scenes with the `radarize` preset.
 
-Three ways to the frames of the first scene in one run: this simulator; the same echoes as a direct sum in float64; and
-the paths of Sionna RT's own solver at the same poses (`benchmarks.sionna`).
+The frames of the first scene are computed in three ways: by this simulator; from the same echoes by a direct sum in
+float64; and from the paths of Sionna RT's solver at the same poses (`benchmarks.sionna`).
 """
 
 import argparse
@@ -24,14 +24,14 @@ CONFIG = PRESETS["radarize"]
 
 
 def walk(name: str, times: np.ndarray, seed: int) -> Scenario:
-    """A handheld walk, its first frames made."""
+    """Return the scenario of a handheld walk, after the simulation of its first frames."""
     scenario, *_ = planned(name, seed=seed, duration=len(times) * CONFIG.frame_period + 1)
     assert scenario.frames(times[:TOGETHER]).samples.any()
     return scenario
 
 
 def pace(scenario: Scenario, times: np.ndarray) -> tuple[float, float, float]:
-    """Medians over a walk: s per frame, s per frame for its echoes; and the mean number of echoes."""
+    """Measure the median run time per frame, and that of its paths, s; return them with the mean number of echoes."""
     spent, counts = [], []
     for batch in np.split(times, range(TOGETHER, len(times), TOGETHER)):
         frames = scenario.frames(batch)
@@ -43,7 +43,8 @@ def pace(scenario: Scenario, times: np.ndarray) -> tuple[float, float, float]:
 
 
 def beside(scenario: Scenario, workers: int) -> tuple[float, float]:
-    """A recording by so many processes, to a file: s per frame after the first tenth, and s until that was written."""
+    """Measure a recording by a number of processes: run time per frame after the first tenth, and time until that,
+    s."""
     seen, frames = [], len(scenario.times)
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
@@ -56,7 +57,8 @@ def beside(scenario: Scenario, workers: int) -> tuple[float, float]:
 
 
 def summed(scenario: Scenario, times: np.ndarray) -> tuple[float, float]:
-    """The direct sum of the same echoes: median s per frame, and the fast synthesis' worst error power, dB."""
+    """Compute the direct sum of the same echoes: median run time per frame, s, and largest error power of the fast
+    synthesis, dB."""
     seconds, errors = [], []
     for t in times:
         (present,) = scenario.frames([t]).paths
@@ -69,7 +71,7 @@ def summed(scenario: Scenario, times: np.ndarray) -> tuple[float, float]:
 
 
 def memory_growth(scenario: Scenario, frames: int) -> str:
-    """Resident memory early and late in a long run, MB."""
+    """Return the resident memory early and late in a long run, MB, as text."""
     levels = []
     for k in range(0, frames, TOGETHER):
         times = np.arange(k, k + TOGETHER) * CONFIG.frame_period % (scenario.motion.duration - 1)
@@ -82,13 +84,13 @@ def memory_growth(scenario: Scenario, frames: int) -> str:
 
 @script(
     "Simulator speed, preset radarize",
-    frames=(240, "of a walk"),
-    recorded_frames=(1800, "of a recording by several processes"),
-    direct_frames=(2, "summed directly"),
-    sionna_frames=(20, "by Sionna's paths"),
-    memory_frames=(0, "frames of a long run that watches memory"),
-    seed=(0, "of walks and worlds"),
-    scenes=(["office", "corridor", "floor"], "the first in detail", {"nargs": "+", "type": str}),
+    frames=(240, "frames of a walk"),
+    recorded_frames=(1800, "frames of a recording by several processes"),
+    direct_frames=(2, "frames of the direct sum"),
+    sionna_frames=(20, "frames with Sionna's paths"),
+    memory_frames=(0, "frames of a long run for the measurement of memory; 0: none"),
+    seed=(0, "seed of walks and scenes"),
+    scenes=(["office", "corridor", "floor"], "scenes; the first one in detail", {"nargs": "+", "type": str}),
 )
 def main(options: argparse.Namespace) -> Page:
     times, first = np.arange(options.frames) * CONFIG.frame_period, options.scenes[0]
@@ -97,7 +99,7 @@ def main(options: argparse.Namespace) -> Page:
         scenarios[name], begun = timed(walk, name, times, options.seed)
         frame, finding, echoes = pace(scenarios[name], times)
         ways.append((f"{name}: radarsim", frame, echoes, "int16 I/Q with noise"))
-        ways.append((f"{name}: of it, finding echoes", finding, echoes, "echoes"))
+        ways.append((f"{name}: thereof path finding", finding, echoes, "echoes"))
         memory = f"{peak_memory_mb():.0f} MB"
         notes.append(f"{name}: first {TOGETHER} frames after {begun:.1f} s; peak memory {memory} so far.")
     _, fastest, echoes, _ = ways[0]
@@ -123,9 +125,10 @@ def main(options: argparse.Namespace) -> Page:
     ways.append((f"{first}: paths of Sionna RT", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
 
     notes += [
-        f"Fast synthesis against the direct sum of the same echoes: error power {error:.1f} dB (worst frame).",
-        f"The radar makes {CONFIG.frame_rate:.0f} frames/s: {first} runs at {1 / fastest / CONFIG.frame_rate:.2f} of "
-        f"real time in one process, {1 / recorded / CONFIG.frame_rate:.2f} in {workers}.",
+        f"Error power of the fast synthesis against the direct sum of the same echoes: {error:.1f} dB (worst frame).",
+        f"The frame rate of the radar is {CONFIG.frame_rate:.0f} Hz: {first} runs at "
+        f"{1 / fastest / CONFIG.frame_rate:.2f} of real time in one process, at "
+        f"{1 / recorded / CONFIG.frame_rate:.2f} in {workers}.",
         f"Medians over {options.frames}, {options.direct_frames} and {options.sionna_frames} frames.",
         f"Sionna RT's PathSolver: {RAYS:.0e} rays, depth {DEPTH}, diffuse reflection; its paths above the noise, "
         "turned into samples by the same synthesis.",

@@ -6,9 +6,9 @@ exp(-j 2 pi f tau); the synthesis puts it in.
 
 Known errors of Sionna RT 2.2.0 as a radar simulator. Do not train on these recordings:
 
-* Corner returns vanish: of a box room, 12 of 18 second-order and 8 of 38 third-order images are missing.
-* Every facet is an infinite mirror: plates of 2 cm and of 2 m at 3 m both return pi R^2 = 28 m^2; a finely
-  tessellated sphere returns nothing, and a scanned wall as many flashes as its noise has it.
+* Corner reflections are missing: 12 of 18 second-order and 8 of 38 third-order images of a box room.
+* Every facet is an infinite mirror: plates of 2 cm and of 2 m at 3 m both have a cross section of pi R^2 = 28 m^2; a
+  finely tessellated sphere has no echo, and a scanned wall has specular reflections that depend on the scan's noise.
 * Diffuse paths are drawn from a lattice fixed to the sensor, anew in every call, without a random phase: speckle keeps
   nothing from one position to another (correlation with the true field 0.99 after 0.1 mm, 0.40 after 1 mm, 0.06 after
   2 mm), so there is no Doppler from frame to frame and no texture to match.
@@ -39,7 +39,7 @@ class Paths:
 
     Attributes:
         length: out and back, between the centres of the arrays in the middle of the burst, m.
-        departure, arrival: unit vectors from the sensor along the first and back along the last leg, world.
+        departure, arrival: unit vectors from the sensor along the first and the last path segment, world.
         tx_center, rx_center: centres of the arrays in the middle of the burst, world, m.
         amplitude: square root of received over transmitted power, with phase, as in the beat signal.
     """
@@ -55,14 +55,14 @@ class Paths:
         return len(self.amplitude)
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
-        """Path lengths over the burst, as `Paths.lengths`: shorter by what an antenna moves along the path."""
+        """Return path lengths over the burst, as `Paths.lengths`: reduced by the antenna's motion along the path."""
         times = time + BurstClock.of(config).nodes
         return self.lengths_from(motion.position(times), motion.rotation(times).as_matrix(), config)
 
     def lengths_from(
         self, position: Float[np.ndarray, "node 3"], rotation: Float[np.ndarray, "node 3 3"], config: RadarConfig
     ) -> Float[np.ndarray, "path virtual 3"]:
-        """The same from poses at the burst's nodes, as `Paths.lengths_from`."""
+        """Return path lengths from poses at the nodes of the burst, as `Paths.lengths_from`."""
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1) - self.tx_center
         rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1) - self.rx_center
         out = np.einsum("pd,tkd->pkt", self.departure, tx)
@@ -105,11 +105,11 @@ class PathSolverFinder:
         rotations: Float[np.ndarray, "frame 3 3"],
         times: Float[np.ndarray, "frame"],
     ) -> list[Paths]:
-        """Paths of several frames, one solver call each; nothing moves in the solver's world."""
+        """Find the paths of several frames, one solver call each; the scene is static."""
         return [self(p, r) for p, r in zip(positions, rotations, strict=True)]
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Paths:
-        """Paths for one sensor pose (rotation: sensor to world)."""
+        """Find the paths of one sensor pose (rotation: sensor to world)."""
         tx = position + rotation @ tx_positions(self.config).mean(axis=0)
         rx = position + rotation @ rx_positions(self.config).mean(axis=0)
         turn = [float(x) for x in Rotation.from_matrix(rotation).as_euler("ZYX")]
@@ -124,7 +124,7 @@ class PathSolverFinder:
         departure = _unit(found.theta_t.numpy().ravel(), found.phi_t.numpy().ravel())
         arrival = _unit(found.theta_r.numpy().ravel(), found.phi_r.numpy().ravel())
         gain = [np.array([amplitude_gain(*d, self._pattern) for d in u @ rotation]) for u in (departure, arrival)]
-        # Sionna's carrier turns forward in time, a beat signal the other way: conjugate.
+        # Sionna's carrier has the phase e^{+jwt}, a beat signal the opposite sign: conjugate.
         amplitude = (real - 1j * imaginary).astype(complex)
         amplitude *= gain[0] * gain[1] if len(amplitude) else 1
         keep = (np.abs(amplitude) > self.weakest) & (delay > 0)
@@ -139,12 +139,12 @@ class SionnaScenario(Scenario):
 
     @classmethod
     def of(cls, scenario: Scenario) -> "SionnaScenario":
-        """The same scenario with Sionna RT's paths."""
+        """Return the same scenario with Sionna RT's paths."""
         return cls(*(getattr(scenario, field.name) for field in fields(Scenario)))
 
     @cached_property
     def finder(self) -> PathSolverFinder:
-        """Finds the paths of a pose."""
+        """Path finder of the scenario."""
         seed = int(self.rng("sionna").integers(2**31))
         return PathSolverFinder(self.scene, self.config, self.board.weakest, self.board.settings.pattern, seed)
 

@@ -1,4 +1,4 @@
-"""The SLAM back end: real lidar logs, graphs with false loops, simulated radar walks, time and memory."""
+"""SLAM back end: errors on real lidar logs, graphs with false loops and simulated radar walks; run time and memory."""
 
 import argparse
 import time
@@ -24,22 +24,22 @@ from radarize.slam.config import SlamConfig, WallsConfig
 from tests.slam.world import align, ate, lap
 
 RADISH = SHARED / "radish"
-#: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
+#: Cartographer on the same files, with its best settings: mean ATE, m and rad; run time, s.
 THEIRS = Beside("Cartographer", "lidar logs, the very same files", simulated=False)
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
-#: How rows of the preset that the paper's settings make are marked.
+#: Label of rows with the preset of Cartographer's settings.
 CLASSIC = "preset cartographer"
 
 
 def errors(truth: np.ndarray, estimate: np.ndarray) -> tuple[float, float]:
-    """Mean error of position (m) and heading (rad) after the best rigid alignment of the positions."""
+    """Return the mean error of position (m) and heading (rad) after rigid alignment of the positions."""
     turn, _ = align(truth, estimate)
     heading = wrap(estimate[:, 2] + np.arctan2(turn[1, 0], turn[0, 0]) - truth[:, 2])
     return ate(truth, estimate), float(np.abs(heading).mean())
 
 
 def loop_length(truth: np.ndarray) -> float:
-    """Longest way between two visits of a place (within 1 m and 60 deg), m."""
+    """Return the longest path between two visits of a place (within 1 m and 60 deg), m."""
     thin = truth[:: max(1, len(truth) // 600)]
     along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(thin[:, :2], axis=0).T))])
     same = np.hypot(*np.moveaxis(thin[:, None, :2] - thin[None, :, :2], -1, 0)) < 1.0
@@ -48,7 +48,7 @@ def loop_length(truth: np.ndarray) -> float:
 
 
 def play(log: Log, config: SlamConfig) -> tuple[Slam, dict[str, float]]:
-    """Feed a log; times of every scan, with the odometry up to it, and of all."""
+    """Run SLAM on a log; return it with run times per scan, including its odometry, and in all."""
 
     def clocks(done: int = 0, total: int = 0) -> None:
         instants.append((time.perf_counter(), time.thread_time(), time.process_time()))
@@ -72,7 +72,7 @@ def play(log: Log, config: SlamConfig) -> tuple[Slam, dict[str, float]]:
 
 
 def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str = "-") -> dict[str, object]:
-    """Play a log and compare it with the truth at its scans."""
+    """Run SLAM on a log and compare it with the truth at its scans."""
     slam, took = play(log, config)
     times, poses = slam.trajectory()
     kept = np.searchsorted(log.times, times)
@@ -97,13 +97,13 @@ def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str
 
 
 def lidar(name: str) -> tuple[Log, np.ndarray]:
-    """A log of the Radish repository and its corrected poses."""
+    """Read a log of the Radish repository and its corrected poses."""
     scans, odometry, truth = (RADISH / f"{name}.{what}" for what in ("scans.npz", "odometry.tum", "truth.tum"))
     return Log.read(scans, odometry), planar(read_tum(truth)[1])
 
 
 def noisier(log: Log, truth: np.ndarray, rng: np.random.Generator) -> Log:
-    """The odometry's own random errors added once more, in another order."""
+    """Add the odometry's own random errors once more, in another order."""
     steps = between(log.odometry[:-1], log.odometry[1:])
     errors = steps - between(truth[:-1], truth[1:])
     errors[:, 2] = wrap(errors[:, 2])
@@ -113,16 +113,16 @@ def noisier(log: Log, truth: np.ndarray, rng: np.random.Generator) -> Log:
     return replace(log, odometry=np.array(poses))
 
 
-def to_and_fro(log: Log, truth: np.ndarray, legs: int) -> tuple[Log, np.ndarray]:
-    """A log forward, backward, forward...: as long as one likes, and closing loops all the time."""
-    order = np.concatenate([np.arange(len(truth))[:: 1 if leg % 2 == 0 else -1][leg > 0 :] for leg in range(legs)])
+def repeated(log: Log, truth: np.ndarray, passes: int) -> tuple[Log, np.ndarray]:
+    """Repeat a log forward, backward, forward..., for a long log with many loop closures."""
+    order = np.concatenate([np.arange(len(truth))[:: 1 if k % 2 == 0 else -1][k > 0 :] for k in range(passes)])
     times = np.arange(float(len(order)))
     there = replace(log, times=times, ranges=log.ranges[order], odometry_times=times, odometry=log.odometry[order])
     return there, truth[order]
 
 
 def graph_rows(seed: int) -> list[dict[str, object]]:
-    """A lap (see `tests.slam.world`) with ten true closures and some false ones."""
+    """Optimise a graph of a lap (`tests.slam.world`) with ten true loop closures and some false ones."""
     rows = []
     for false in (0, 2, 5):
         graph, truth, before = lap(false, seed)
@@ -138,11 +138,11 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
 
 
 def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[NamedWalk]]:
-    """Means over the runs of a benchmark's folder, each with its own odometry and scans, and the worst one, by
-    settings; and what they are of."""
+    """Return means over the runs in the folder of a benchmark, with their odometry and scans, and the run with the
+    largest error, by settings; and the walks."""
     paths = sorted(path.parent for path in folder.glob(f"*/{Pair(**BEST)}/reference.tum"))
     if not paths:
-        raise SystemExit(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `radarize benchmark walks` keeps")
+        raise SystemExit(f"{folder}: has no runs of {Pair(**BEST)}, expected the runs of `radarize benchmark walks`")
     radar = SlamConfig.preset("radar")
     cases = {
         "radar": radar,
@@ -170,9 +170,9 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[NamedWalk]]:
 
 @script(
     "SLAM back end",
-    data=(Path, "folder of runs that `radarize benchmark walks` keeps; lidar and graphs alone if none"),
-    seeds=(3, "of disturbances, for each log"),
-    seed=(7, "the first of them"),
+    data=(Path, "folder of the runs of `radarize benchmark walks`; only lidar logs and graphs if none"),
+    seeds=(3, "number of disturbed versions of each log"),
+    seed=(7, "first seed of the disturbances"),
 )
 def main(options: argparse.Namespace) -> Page:
     lidar_preset, rows, walks, notes = SlamConfig.preset("lidar"), [], [], []
@@ -194,9 +194,9 @@ def main(options: argparse.Namespace) -> Page:
                 found.append(f"{row('', *case, lidar_preset)['ATE m']:.3f}")
         notes += [f"{name}, {what}, {options.seeds} seeds: ATE {', '.join(disturbed[what])} m." for what in disturbed]
     rows += graph_rows(options.seed)
-    log, truth = to_and_fro(*lidar("intel"), legs=3)
+    log, truth = repeated(*lidar("intel"), passes=3)
     resident = memory_mb()
-    rows.append(row("lidar, intel to and fro to 500 submaps", log, truth, lidar_preset, "5 ms, p99 30 ms"))
+    rows.append(row("lidar, intel repeated to 500 submaps", log, truth, lidar_preset, "5 ms, p99 30 ms"))
     notes.append(
         f"Memory grew by {10 * (memory_mb() - resident) / rows[-1]['path m']:.2f} MB per 10 m on the way to "
         f"{rows[-1]['submaps']} submaps, the final optimisation included."
@@ -210,12 +210,12 @@ def main(options: argparse.Namespace) -> Page:
         networks=Networks().used(Pair(**BEST).networks) if options.data else (),
         beside=[THEIRS],
         notes=[
-            "Mean errors after alignment; closures: believed / found. One preset for all logs, one for all radar runs. "
-            "Lidar's targets are Cartographer's on the same files, with its best settings.",
-            "Per scan: what `add_odometry` and `add_scan` take of the caller, wall and processor time; the loop search "
-            "runs in two threads beside it. s, CPU s: the whole log, final optimisation included.",
-            "Settings for lidar were chosen among about 20 variants by looking at these very logs and their disturbed "
-            "versions: the undisturbed figures flatter, the disturbed ones show the spread.",
+            "ATE: mean errors after alignment. closures: accepted / found loop closures. One preset for all logs, and "
+            "one for all radar runs. Targets of the lidar logs are Cartographer's errors with its best settings.",
+            "per scan: wall and processor time of `add_odometry` and `add_scan` in the calling thread; the loop search "
+            "runs in two other threads. s, CPU s: the whole log, including the final optimisation.",
+            "Settings for lidar were chosen among about 20 variants on these logs and their disturbed versions: "
+            "results on the undisturbed logs are optimistic, the disturbed ones show the spread.",
             *notes,
         ],
     )

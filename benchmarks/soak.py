@@ -1,4 +1,5 @@
-"""Sessions that go on and on: `radarize live` at the virtual radar over a bad network, and a day of SLAM at a blow."""
+"""Long sessions: `radarize live` with the virtual radar over a network with losses, and SLAM over a day,
+accelerated."""
 
 import argparse
 import re
@@ -30,17 +31,17 @@ from tests.slam.world import box, scan, walk
 from tests.virtual import BOARD, COMPUTER, emulator
 
 NETWORK = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}
-#: s of the walk that is played again and again; s between looks at memory; share of a session that warms up.
+#: Duration of the repeated walk, s; interval of memory measurements, s; share of a session for warm-up.
 WALK, LOOK, WARM = 5.0, 1.0, 0.2
-#: s between a disk that fills and the next time that it does, and how long it stays full; kiB of it for a frame.
+#: Interval at which the disk is filled, and time for which it stays full, s; disk space per frame, kiB.
 FULL_EVERY, FULL_FOR, ROOM_FOR_A_FRAME = 120.0, 3.0, 400
-#: A room, m, and a way through it that is walked for so many s of each hour, scans coming at so many Hz.
+#: Walls of a room, m; path through it, m; walking time per hour, s; scan rate, Hz.
 ROOM = np.concatenate([box(0, 0, 8, 6), box(3, 2.5, 3.6, 3.1), box(7, 0, 8, 0.6), box(0, 5, 0.5, 6)])
 ROUND, WALKED, RATE = [[1, 1], [6, 1], [6, 4.5], [1, 4.5], [1, 1]], 60.0, 5.0
 
 
 def pester(port: int, ended: threading.Event, counts: dict[str, int]) -> None:
-    """Packets from the board's address that are not the board's: of the right form, and garbage."""
+    """Send forged packets from the board's address: a valid header with random content."""
     rng = np.random.default_rng(0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.bind((BOARD, 0))
@@ -51,7 +52,7 @@ def pester(port: int, ended: threading.Event, counts: dict[str, int]) -> None:
 
 
 def look_on(url: str, ended: threading.Event, counts: dict[str, int]) -> None:
-    """A browser that comes, takes events for a while, and goes."""
+    """Visit the page repeatedly, reading its events for a while."""
     while not ended.wait(1.0):
         try:
             with urllib.request.urlopen(url) as page, urllib.request.urlopen(url + "events") as events:
@@ -65,7 +66,7 @@ def look_on(url: str, ended: threading.Event, counts: dict[str, int]) -> None:
 
 
 def crowd_out(place: Path, ended: threading.Event, counts: dict[str, int]) -> None:
-    """Somebody whose files fill a disk now and then."""
+    """Fill the disk at intervals."""
     while not ended.wait(FULL_EVERY):
         fill(place / "large")
         counts["full"] += 1
@@ -74,7 +75,7 @@ def crowd_out(place: Path, ended: threading.Event, counts: dict[str, int]) -> No
 
 
 def live(minutes: float, folder: Path, seed: int) -> tuple[dict[str, object], str]:
-    """A session at the virtual radar: a row of the table, and what its recording warns of."""
+    """Run a session with the virtual radar: a row of the table, and warnings of its recording."""
     frames = round(60 * minutes / PRESETS["radarize"].frame_period)
     room = (64 << 10) + frames * ROOM_FOR_A_FRAME
     with disk(folder / "recorded", room, folder / "image.ext4") as place:
@@ -111,7 +112,7 @@ def _live(frames: int, folder: Path, output: Path, seed: int) -> tuple[dict[str,
                 guest.join()
     arriving = chirps_that_arrive(config, frames, Disturbance(**NETWORK, rng=np.random.default_rng(seed)))
     losses, mismarked, wrong, warnings = compared(output, played, arriving)
-    memory = np.array(memory[:-2])  # while it ends, the graph is optimised
+    memory = np.array(memory[:-2])  # without the final optimisation of the graph
     return {
         "case": f"live, {frames * config.frame_period / 60:.3g} min, " + " ".join(options),
         "exit code": session.returncode,
@@ -130,7 +131,7 @@ def _live(frames: int, folder: Path, output: Path, seed: int) -> tuple[dict[str,
 
 
 def day(hours: float, seed: int) -> dict[str, object]:
-    """SLAM without end, as fast as it goes: standing, with a minute's walk in the same room every hour."""
+    """Run endless SLAM as fast as possible: at rest, with a walk of a minute in the same room every hour."""
     slam, rng = Slam(SlamConfig.preset("radar"), endless=True), np.random.default_rng(seed)
     steps = walk(ROUND, 0.5 / RATE, 0.5 / RATE)
     ways, frames = np.concatenate([steps, steps[::-1]]), round(3600 * hours * RATE)
@@ -152,11 +153,11 @@ def day(hours: float, seed: int) -> dict[str, object]:
             memory.append(memory_mb())
     now = compose(slam.graph.poses[-1], between(slam.odometry.pose(slam.nodes[-1].time), odometry))
     return {
-        "case": f"SLAM at a blow, {hours:g} h of standing, {WALKED:g} s of walking in each",
+        "case": f"SLAM, accelerated, {hours:g} h at rest, {WALKED:g} s of walking per hour",
         "frames": frames,
         "nodes kept": len(slam.nodes),
-        "place off by, m": float(np.hypot(*(now - true)[:2])),
-        "odometry off by, m": float(np.hypot(*(odometry - true)[:2])),
+        "position error, m": float(np.hypot(*(now - true)[:2])),
+        "position error of odometry, m": float(np.hypot(*(odometry - true)[:2])),
         "MB after warm-up": memory[min(1 + int(WARM * len(memory)), len(memory) - 1)],
         "MB at the end": float(memory[-1]),
         "MB at most": max(memory),
@@ -164,22 +165,22 @@ def day(hours: float, seed: int) -> dict[str, object]:
 
 
 @script(
-    "Sessions that go on and on",
-    minutes=(60.0, "of the live session; 0: none"),
-    hours=(24.0, "of the day; 0: none"),
-    seed=(0, "of walk, network and noise"),
+    "Long sessions",
+    minutes=(60.0, "duration of the live session, min; 0: none"),
+    hours=(24.0, "duration of accelerated SLAM, h; 0: none"),
+    seed=(0, "seed of walk, network and noise"),
 )
 def main(options: argparse.Namespace) -> Page:
-    """The table."""
+    """Run both sessions."""
     rows = []
     notes = [
-        f"Live: {WALK:g} s of a simulated office again and again, its jump back included; every sample compared with "
-        "the one sent, and every chirp's mark with what the network's seed says was lost. Forged packets come from the "
-        "board's address and another port; a browser takes events for 3 s and goes.",
-        f"Memory is resident, of the session and the process that receives; warm after {WARM:.0%} of a row's time. "
-        f"The day's scans come at {RATE:g} Hz.",
-        f"Every {FULL_EVERY:g} s something else takes all room on the recording's disk, for {FULL_FOR:g} s; frames of "
-        "that time are not written, and counted.",
+        f"live: {WALK:g} s of a simulated office, repeated; every sample is compared with the one sent, and the mark "
+        "of every chirp with the losses of the simulated network. Forged packets have the board's address and another "
+        "port; a client reads the events of the page for 3 s at a time.",
+        f"Memory: resident size of the session and the receiving process; warm-up: {WARM:.0%} of the duration. The "
+        f"scan rate of SLAM is {RATE:g} Hz.",
+        f"Every {FULL_EVERY:g} s the recording's disk is full for {FULL_FOR:g} s; frames of this time are not written, "
+        "and counted.",
         surroundings(),
     ]
     if options.minutes:

@@ -13,6 +13,7 @@ from PIL import Image
 
 from radarize.evaluation.evaluate import trajectory_errors
 from radarize.evaluation.report.drawings import draw_doppler, draw_fan, draw_scan
+from radarize.evaluation.report.page import COLORS
 from radarize.io.recording import Recording
 from radarize.pipeline.runfolder import RunFolder
 from radarize.signal.heatmaps import Heatmaps
@@ -57,7 +58,7 @@ def trajectory_and_map(run: Path) -> plt.Figure:
     cells = grid.centers(grid.occupied)
     cells = np.column_stack([cells, np.zeros(len(cells))]) @ slam.turn.T + slam.shift
     axis.plot(cells[:, 0], cells[:, 1], "s", color="#7b52c7", ms=1.6, label="map (occupied cells)")
-    for name, item, color in (("odometry", errors["odometry"], "#e4572e"), ("SLAM", slam, "#1f7bd0")):
+    for name, item, color in (("odometry", errors["odometry"], COLORS["odometry"]), ("SLAM", slam, COLORS["slam"])):
         path = item.estimate.positions_xyz
         axis.plot(path[:, 0], path[:, 1], color=color, lw=1.6, label=f"{name}: mean error {item.position.mean:.2f} m")
     truth = slam.reference.positions_xyz

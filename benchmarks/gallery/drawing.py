@@ -1,4 +1,4 @@
-"""What several laws need: the radar, curves of theory and simulation, and simple worlds."""
+"""Common parts of the laws: the radar, curves of theory and simulation, and simple scenes."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,17 +20,17 @@ FOUND = {"color": "tab:red", "marker": "o", "ms": 3.5, "ls": "", "label": "simul
 
 
 def compare(axis: Axes, x, theory, found) -> float:
-    """Draw both over x; the largest difference."""
+    """Plot theory and simulation over x; return the largest difference."""
     axis.plot(x, theory, **THEORY)
     axis.plot(x, found, **FOUND)
     return np.abs(np.asarray(found) - theory).max()
 
 
 def target(*place: float) -> PathFinder:
-    """Finds a scatterer of 1 m^2 there."""
+    """Return a path finder of a point scatterer of 1 m^2."""
     return PathFinder(None, Scatterers.points(np.array(place), np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
 
 
 def walls_of(scene: Scene) -> PathFinder:
-    """Finds the surfaces of a scene alone."""
+    """Return a path finder of the surfaces of a scene, without scatterers."""
     return PathFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)

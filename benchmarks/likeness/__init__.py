@@ -1,1 +1,1 @@
-"""How like real walks simulated ones are: pictures of either, their statistics, and a network that tells them apart."""
+"""Realism of simulated walks: real and simulated pictures, their statistics, and a network that classifies them."""

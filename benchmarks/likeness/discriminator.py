@@ -1,7 +1,8 @@
-"""A network that is trained to tell real pictures from simulated ones, and judged on walks that it has not seen.
+"""A network that classifies pictures as real or simulated, with cross-validation over walks.
 
-Its balanced accuracy is the measure of likeness: 50 % is chance, so perfect. Walks are split in folds; of those that
-train, one in five decides when training stops.
+Its balanced accuracy measures realism: 50 % is chance, the ideal. Walks are divided into folds; one of the training
+    folds
+is the validation set for early stopping.
 """
 
 from dataclasses import dataclass
@@ -13,14 +14,14 @@ from torch import Tensor, nn
 
 from benchmarks.likeness.pictures import Bursts
 
-#: Walks are tested in so many folds.
+#: Number of folds of the cross-validation.
 FOLDS = 5
-#: Training: rate, pictures of a batch, epochs at most, and without improvement before it ends.
+#: Training: learning rate, batch size, maximum number of epochs, and of epochs without improvement.
 RATE, BATCH, EPOCHS, PATIENCE = 1e-3, 64, 16, 4
 
 
 def network(channels: int, width: int = 16) -> nn.Sequential:
-    """Five convolutions with strides, and the mean and the largest over the picture of what they find."""
+    """Return a network of five strided convolutions, and mean and maximum pooling over the picture."""
 
     def layer(least: int, most: int, size: int) -> list[nn.Module]:
         return [nn.Conv2d(least, most, size, stride=2, padding=size // 2), nn.GroupNorm(4, most), nn.ReLU()]
@@ -34,7 +35,7 @@ def network(channels: int, width: int = 16) -> nn.Sequential:
 
 
 class _Pooled(nn.Module):
-    """The mean and the largest over the picture."""
+    """Mean and maximum over the picture."""
 
     def forward(self, found: Float[Tensor, "n channel row column"]) -> Float[Tensor, "n 2channel"]:
         return torch.cat([found.mean(dim=(2, 3)), found.amax(dim=(2, 3))], dim=1)
@@ -42,11 +43,11 @@ class _Pooled(nn.Module):
 
 @dataclass(frozen=True)
 class Judged:
-    """What a discriminator found in walks that it had not seen.
+    """Results of a discriminator on test folds.
 
     Attributes:
-        accuracy: balanced, by fold.
-        real, simulated: its output (> 0: simulated) for each walk's samples, walk after walk.
+        accuracy: balanced accuracy of each fold.
+        real, simulated: output (> 0: simulated) for the samples of each walk.
     """
 
     accuracy: Float[np.ndarray, "fold"]
@@ -55,12 +56,12 @@ class Judged:
 
 
 def single(bursts: Bursts) -> UInt8[np.ndarray, "sample 1 range azimuth"]:
-    """Each picture a sample."""
+    """Return samples of single pictures."""
     return bursts.reshape(-1, 1, *bursts.shape[2:])
 
 
 def pairs(bursts: Bursts) -> UInt8[np.ndarray, "sample 2 range azimuth"]:
-    """Two pictures 0.2 s apart a sample (`pictures.OFFSETS`)."""
+    """Return samples of two pictures 0.2 s apart (`pictures.OFFSETS`)."""
     return np.concatenate([bursts[:, [0, 2]], bursts[:, [3, 4]]])
 
 
@@ -68,8 +69,8 @@ def judge(real: list[UInt8[np.ndarray, "..."]], simulated: list[UInt8[np.ndarray
     """Train and test on each fold.
 
     Args:
-        real, simulated: samples by walk.
-        seed: of folds, networks and their training.
+        real, simulated: samples of each walk.
+        seed: seed of folds, networks and their training.
     """
     walks = [*real, *simulated]
     label = np.repeat([0, 1], [len(real), len(simulated)])
@@ -93,11 +94,11 @@ def _gathered(walks: list, label: np.ndarray, some: np.ndarray) -> tuple[Tensor,
 
 
 def _trained(x: Tensor, y: Tensor, x_held: Tensor, y_held: Tensor, seed: int) -> nn.Module:
-    """Train until the loss on walks kept aside no longer falls; the best of all epochs."""
+    """Train until the validation loss no longer falls; return the network of the best epoch."""
     torch.manual_seed(seed)
     model = network(x.shape[1])
     optimizer = torch.optim.AdamW(model.parameters(), RATE, weight_decay=1e-2)
-    # Both kinds count the same, however many there are of each.
+    # Both classes have the same weight.
     weight = torch.where(y > 0, (1 - y.mean()) / y.mean(), 1.0)
     best, state, waited = np.inf, None, 0
     for _ in range(EPOCHS):
@@ -126,6 +127,6 @@ def _output(model: nn.Module, x: Tensor) -> Float[np.ndarray, "sample"]:
 
 
 def _balanced(outputs: list[np.ndarray], label: np.ndarray) -> float:
-    """Mean of the shares of either kind that are classified correctly."""
+    """Return the mean over both classes of the share classified correctly."""
     shares = [np.concatenate([o > 0 for o, k in zip(outputs, label, strict=True) if k == kind]) for kind in (0, 1)]
     return float((np.mean(~shares[0]) + np.mean(shares[1])) / 2)

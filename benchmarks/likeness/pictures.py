@@ -1,7 +1,7 @@
-"""Bursts of radar pictures along walks: RadarHD's real ones, and simulated ones by cart with the same chirps.
+"""Bursts of radar pictures along walks: RadarHD's real walks, and simulated cart walks with the same chirps.
 
-A burst is five frames, so that what motion does over 0.05 to 1.2 s is seen. Pictures are those of
-`radarize.signal.polar`, of one transmitter.
+A burst has five frames, for the effects of motion over 0.05 to 1.2 s. Pictures are those of `radarize.signal.polar`,
+with one transmitter.
 """
 
 import io
@@ -23,24 +23,24 @@ from radarsim.world.scene import Scene
 
 #: Chirps of the real walks, one loop of a frame.
 CONFIG = PRESETS["radarhd"].model_copy(update={"loops": 1})
-#: Frames of a burst after its first one, and bursts of a walk.
+#: Frame offsets of a burst, and number of bursts of a walk.
 OFFSETS, BURSTS = np.array([0, 1, 4, 20, 24]), 40
-#: s, between frames of a burst; s, of a simulated walk.
+#: Time offsets of a burst, s; duration of a simulated walk, s.
 TIMES, DURATION = OFFSETS * CONFIG.frame_period, 60.0
-#: m/s, of the real walks on average (1,009 m in 42,116 frames), and of a cart. Nothing moves but the radar, so frames
-#: as much nearer in time are as far apart in space as the real ones.
+#: Mean speed of the real walks (1,009 m in 42,116 frames) and speed of a cart, m/s. Only the radar moves, so time
+#: offsets are scaled to give the distances of the real frames.
 REAL_SPEED, CART_SPEED = 0.48, PLATFORMS["cart"].speed
 
 Bursts = UInt8[np.ndarray, "burst frame range azimuth"]
 
 
 def starts(frames: int) -> np.ndarray:
-    """First frames of the bursts of a walk, evenly spread."""
+    """Return the first frames of the bursts of a walk, evenly spaced."""
     return np.linspace(0, frames - 1 - OFFSETS[-1], BURSTS).astype(int)
 
 
 def real(folder: Path, part: str) -> dict[int, Bursts]:
-    """Bursts of each of RadarHD's walks of a part (train, test), by number."""
+    """Return the bursts of RadarHD's walks of a part (train, test), indexed by the number of the walk."""
     found = {}
     for path in sorted((folder / "walks").glob("*.npz.xz")):
         with np.load(io.BytesIO(lzma.open(path).read())) as walk:
@@ -52,11 +52,11 @@ def real(folder: Path, part: str) -> dict[int, Bursts]:
 
 @dataclass(frozen=True)
 class Simulated:
-    """A simulated walk by cart.
+    """A simulated cart walk.
 
     Attributes:
         scene: fields of a scene file.
-        seed: of walk and world.
+        seed: seed of walk and scene.
         surfaces: fields of the scene file that are set, e.g. ``clutter``.
     """
 
@@ -79,7 +79,7 @@ class Simulated:
 
 
 def buildings(number: int, seed: int) -> list[dict]:
-    """Floors of generated buildings of all styles, by turns."""
+    """Return floors of generated buildings of all styles in turn."""
     return [
         {"name": f"building {'ABCD'[k % 4]} {seed + k}", "building": {"kind": "ABCD"[k % 4], "seed": seed + k}}
         for k in range(number)

@@ -1,4 +1,4 @@
-"""Pictures of either kind side by side, and what the discriminator looks at in them."""
+"""Sheets of real and simulated pictures, sorted by the output of the discriminator."""
 
 from pathlib import Path
 
@@ -9,13 +9,13 @@ from benchmarks.likeness.discriminator import Judged
 from benchmarks.likeness.pictures import Bursts
 from radarize.signal import polar
 
-#: Pictures of each kind on a sheet, each of another walk.
+#: Pictures of each kind on a sheet, each from a different walk.
 COLUMNS = 10
 
 
 def draw(folder: Path, name: str, real: list[Bursts], simulated: list[Bursts], judged: Judged) -> None:
-    """Draw a sheet: of each kind, the pictures of which the discriminator is most certain and those of the median
-    certainty, each of another walk, range upward and azimuth to the left."""
+    """Draw a sheet with the pictures of each kind with the largest and with the median output of the discriminator,
+    each from a different walk; range is up, azimuth to the left."""
     figure, axes = plt.subplots(4, COLUMNS, figsize=(2 * COLUMNS, 12), sharex=True, sharey=True)
     kinds = ("real", real, [-output for output in judged.real]), ("simulated", simulated, judged.simulated)
     for row, (kind, walks, outputs) in enumerate(kinds):
@@ -30,7 +30,7 @@ def draw(folder: Path, name: str, real: list[Bursts], simulated: list[Bursts], j
                 axis.set_title(f"{kind}, {outputs[walk][index]:+.1f}", fontsize=8)
     figure.supxlabel("azimuth, deg")
     figure.supylabel("range, m")
-    figure.suptitle(f"{name}: of which the discriminator is most certain (upper rows), and of the median certainty")
+    figure.suptitle(f"{name}: largest output of the discriminator (upper rows), and median output (lower rows)")
     figure.tight_layout()
     folder.mkdir(parents=True, exist_ok=True)
     figure.savefig(folder / f"{name}.png", dpi=70)

@@ -1,4 +1,4 @@
-"""Statistics of a walk's pictures: how many peaks there are, where, how strong, and how long they last."""
+"""Statistics of the pictures of a walk: number, positions, levels and persistence of peaks."""
 
 from dataclasses import dataclass
 
@@ -10,32 +10,32 @@ from scipy.spatial import cKDTree
 from benchmarks.likeness.pictures import TIMES, Bursts
 from radarize.signal import polar
 
-#: dB, that a picture shows below its largest.
+#: Dynamic range of a picture, dB.
 DEPTH = -20 * np.log10(polar.THRESHOLD)
-#: A peak is the largest of so many ranges and azimuths.
+#: Size of the neighbourhood of a local maximum, range and azimuth cells.
 _PEAK = 5, 9
-#: dB below the strongest: depths at which peaks are counted; of those whose places are looked at.
+#: Levels below the strongest cell within which peaks are counted, and within which their positions are evaluated, dB.
 DEPTHS, SPREAD = (10, 20, 26), 20
-#: m around the strongest cell whose power is taken as its own.
+#: Distance from the strongest cell within which power counts as its own, m.
 _OWN = 0.2
-#: A peak is found again within so many m and rad at once, and so many more a second.
+#: Maximum distance to a peak in a later frame, m and rad, and its growth with time, m/s and rad/s.
 _GATE, _GATE_RATE = (0.1, np.radians(5)), (0.5, np.radians(10))
 _RANGES, _AZIMUTHS = polar.RANGES, polar.AZIMUTHS
 
 
 def shares(kept: Bool[np.ndarray, "frame range azimuth"]) -> tuple[float, float, float]:
-    """Cells kept, ranges with any, and azimuths lit at such a range, each as a share."""
+    """Return the shares of non-zero cells, of ranges with such a cell, and of non-zero azimuths at such a range."""
     lit = kept.any(axis=2)
     return kept.mean(), lit.mean(), kept.sum(axis=2)[lit].mean() / polar.COLUMNS
 
 
 def levels(pictures: UInt8[np.ndarray, "*frame range azimuth"]) -> Float[np.ndarray, "*frame range azimuth"]:
-    """dB below the strongest cell, -inf where nothing is kept."""
+    """Return levels relative to the strongest cell, dB; -inf in zero cells."""
     return np.where(pictures > 0, DEPTH * (pictures / 255.0 - 1), -np.inf)
 
 
 def peaks(level: Float[np.ndarray, "range azimuth"]) -> Bool[np.ndarray, "range azimuth"]:
-    """Local maxima of a picture."""
+    """Find the local maxima of a picture."""
     return (level == maximum_filter(level, _PEAK)) & np.isfinite(level)
 
 
@@ -49,19 +49,19 @@ class Peaks:
 
     @classmethod
     def of(cls, picture: UInt8[np.ndarray, "range azimuth"]) -> "Peaks":
-        """Find them."""
+        """Find the peaks of a picture."""
         level = levels(picture)
         row, column = np.nonzero(peaks(level))
         return cls(_RANGES[row], _AZIMUTHS[column], level[row, column])
 
     def above(self, level: float) -> "Peaks":
-        """Those above a level, dB."""
+        """Select the peaks above a level, dB."""
         some = self.level >= level
         return Peaks(self.range[some], self.azimuth[some], self.level[some])
 
 
 def persistence(first: Peaks, later: Peaks, lag: float) -> tuple[float, Float[np.ndarray, "found"]]:
-    """Share of peaks that are found again after `lag` s, and by how many dB those changed."""
+    """Return the share of peaks that are found again after `lag` s, and the changes of their levels, dB."""
     if not len(first.range) or not len(later.range):
         return 0.0, np.empty(0)
     gate = [least + rate * lag for least, rate in zip(_GATE, _GATE_RATE, strict=True)]
@@ -72,7 +72,7 @@ def persistence(first: Peaks, later: Peaks, lag: float) -> tuple[float, Float[np
 
 
 def of(bursts: Bursts) -> dict[str, float]:
-    """Of a walk, by name with unit: means over its frames."""
+    """Return the statistics of a walk, means over its frames, by name with unit."""
     pictures = bursts.reshape(-1, *bursts.shape[2:])
     found = [[Peaks.of(picture) for picture in burst] for burst in bursts]
     flat = [each for burst in found for each in burst]
@@ -101,8 +101,8 @@ def of(bursts: Bursts) -> dict[str, float]:
 
 
 def beam_misfit(pictures: UInt8[np.ndarray, "frame range azimuth"], antennas: int) -> float:
-    """Median over frames of the RMS difference, dB, between the row of the strongest cell and the beam of so many
-    antennas half a wavelength apart that points anywhere near it."""
+    """Return the median over frames of the RMS difference between the row of the strongest cell and the best-fitting
+    beam of a number of antennas half a wavelength apart, dB."""
     sines, misfits = np.sin(polar.AZIMUTHS), []
     for picture in pictures:
         row, column = np.unravel_index(picture.argmax(), picture.shape)

@@ -1,1 +1,2 @@
-"""Independent references of physical laws: closed forms, brute-force sums and rigs, for the tests and the gallery."""
+"""Independent references for physical laws: closed forms, brute-force sums and motions, for the tests and the
+gallery."""

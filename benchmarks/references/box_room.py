@@ -16,7 +16,7 @@ CONFIG = PRESETS["radarize"]
 
 
 def images_of_a_room(observation):
-    """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
+    """Return the images of a radar in a box room by walls and chains of walls: isometries, amplitudes, orders."""
     flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
     parts = plates.specular_points(flat, observation, 0)
     single = parts.isometry
@@ -29,7 +29,7 @@ def images_of_a_room(observation):
 
 
 def lattice(p):
-    """The same images by the lattice of rooms: order, by axis whether it is turned, and place."""
+    """Yield the same images by the lattice of mirrored rooms: order, whether each axis is mirrored, and position."""
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     for cell in product(range(-3, 4), repeat=3):
         order, even = int(np.abs(cell).sum()), np.array(cell) % 2 == 0

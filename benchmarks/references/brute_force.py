@@ -1,7 +1,7 @@
-"""Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
+"""Independent float64 references.
 
-`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on. `past_pole`, `past_edge`: what poles
-and half planes leave.
+`beat`: beat signal of points in the world, sample by sample from the motion. `transfer_matrix`: layers.
+`kirchhoff_mirror`: reflection by a mirror of any size. `past_pole`, `past_edge`: diffraction by poles and half planes.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ from radarsim.propagation.burst import BurstClock
 
 
 def beat(config: RadarConfig, motion, time: float, points, amplitude) -> np.ndarray:
-    """Sum over echoes with path length |tx - a| + |b - rx|, every antenna placed anew at every sample instant.
+    """Sum over echoes with path length |tx - a| + |b - rx|, with the antenna positions at every sample.
 
-    What is sent at time t has the phase theta(t) = 2 pi (f_c t + S t^2 / 2); a dechirped echo of delay tau has
+    The transmitted phase at time t is theta(t) = 2 pi (f_c t + S t^2 / 2); that of a dechirped echo of delay tau is
     theta(t) - theta(t - tau).
     """
     loops, n_tx, n_rx, samples, _ = config.frame_shape
@@ -40,7 +40,7 @@ def beat(config: RadarConfig, motion, time: float, points, amplitude) -> np.ndar
 
 
 def transfer_matrix(layers, cosine, frequency, tm):
-    """Transmission and reflection of layers (permittivity, thickness) in air by 2 x 2 matrices, e^{+jwt}.
+    """Compute transmission and reflection of layers (permittivity, thickness) in air by 2 x 2 matrices, e^{+jwt}.
 
     Born and Wolf, 1.6; ratios of the fields along the layers.
     """
@@ -61,8 +61,8 @@ def transfer_matrix(layers, cosine, frequency, tm):
 
 
 def direct_sum(config: RadarConfig, lengths: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
-    """The beat signal (loop, tx, rx, sample) of path-length parabolas as everybody writes it first: float64, one matrix
-    of phases per trace."""
+    """Compute the beat signal (loop, tx, rx, sample) of path-length parabolas directly: float64, one matrix of phases
+    per trace."""
     loops, tx, rx, samples, _ = config.frame_shape
     clock = BurstClock.of(config)
     n = (np.arange(samples) - (samples - 1) / 2) / config.sample_rate
@@ -81,7 +81,7 @@ def direct_sum(config: RadarConfig, lengths: np.ndarray, amplitudes: np.ndarray)
 
 
 def kirchhoff_mirror(half, place, wavelength, across=1601):
-    """Amplitude (1/m) of the way from the origin over a mirror about (1.5, 1, 0), facing -y, to a place, summed.
+    """Sum the amplitude (1/m) of the path from the origin over a mirror at (1.5, 1, 0), facing -y, to a point.
 
     (1 / (j lambda)) int cos exp(jk (r1 + r2)) / (r1 r2) dA, Kirchhoff's approximation with the mean of both cosines,
     relative to the image's phase.
@@ -97,14 +97,14 @@ def kirchhoff_mirror(half, place, wavelength, across=1601):
 
 
 def past_pole(offset, width, places, path, wavelength, nodes=200):
-    """Share of a wave's amplitude that passes an opaque strip beside the axis, met twice on a path, by Kirchhoff.
+    """Return the relative amplitude of a wave past an opaque strip that crosses a path twice, by Kirchhoff's integral.
 
-    Babinet: all of it, less what comes through either strip, plus what comes through both; float64.
+    Babinet's principle: the free wave, minus the fields through either strip, plus the field through both; float64.
 
     Args:
-        offset, width: of the strip, m.
-        places: where on the path it is met, from one end, m.
-        path: its length, m.
+        offset, width: offset from the axis and width of the strip, m.
+        places: distances of the crossings from one end of the path, m.
+        path: length of the path, m.
     """
     x = offset + ((np.arange(nodes) + 0.5) / nodes - 0.5) * width
     gaps, wavenumber, step = np.diff([0.0, *places, path]), 2 * np.pi / wavelength, width / nodes
@@ -119,15 +119,17 @@ def past_pole(offset, width, places, path, wavelength, nodes=200):
 
 
 def past_edge(offset, places, path, wavelength, nodes=400):
-    """Share of a wave's amplitude that passes an opaque half plane which it meets twice on a path, by Kirchhoff.
+    """Return the relative amplitude of a wave past an opaque half plane that a path meets twice, by Kirchhoff's
+    integral.
 
-    The double Fresnel integral over u_1, u_2 < a, a complex normal distribution of some correlation: the inner one in
-    closed form, the outer one along a contour turned by 45 deg from the edge on, where the phase decays; float64.
+    The double Fresnel integral over u_1, u_2 < a is a complex normal distribution with correlation: the inner integral
+    is in closed form, the outer one along a contour rotated by 45 deg at the edge, on which the integrand decays;
+    float64.
 
     Args:
-        offset: how far the edge leaves the path clear, m; negative in its shadow.
-        places: where on the path it is met, from one end, m.
-        path: its length, m.
+        offset: distance of the edge from the path, m; negative in its shadow.
+        places: distances of the crossings from one end of the path, m.
+        path: length of the path, m.
     """
     one, two = places
     a, b = (offset / np.sqrt(wavelength * d * (path - d) / (2 * path)) for d in places)
@@ -140,16 +142,18 @@ def past_edge(offset, places, path, wavelength, nodes=400):
 
 
 def bounced(scene, position, up, axis, spread, bounces, wavelength, across=700):
-    """Echo amplitude, isotropic antenna, of rays that leave about an axis and meet so many conductors on their way.
+    """Return the echo amplitude of a fan of rays after a number of reflections, with an isotropic antenna.
 
-    Shooting and bouncing rays (Ling, Chou and Lee, IEEE TAP 37(2), 1989): geometric optics to the last surface, from
-    there physical optics back to the radar, if it can be seen. The fan ends smoothly, see `fan`.
+    Shooting and bouncing rays (Ling, Chou and Lee, IEEE TAP 37(2), 1989): geometric optics to the last surface, then
+    physical optics back to the radar, if it is visible. The fan is tapered, see `fan`.
 
     Args:
-        scene: of which everything is taken for a perfect conductor.
-        position, up: of the antenna, m and unit vector.
-        axis, spread: unit vector, and tangent of the fan's half width.
-        across: rays along one side of the fan.
+        scene: scene, all of whose surfaces are perfect conductors.
+        position, up: position (m) and polarisation (unit vector) of the antenna.
+        axis, spread: axis of the fan (unit vector), and tangent of its half width.
+        bounces: number of reflections.
+        wavelength: m.
+        across: number of rays along one side of the fan.
     """
     aside = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.7 else [1.0, 0.0, 0.0])
     aside /= np.linalg.norm(aside)
@@ -178,7 +182,7 @@ def bounced(scene, position, up, axis, spread, bounces, wavelength, across=700):
 
 
 def fan(tangent, spread):
-    """1 in the inner half of a fan of rays, down to 0 at its end."""
+    """Return the taper of a fan of rays: 1 in the inner half, decreasing to 0 at the edge."""
     return np.cos(np.pi / 2 * np.clip(2 * tangent / spread - 1, 0, 1)) ** 2
 
 

@@ -20,7 +20,8 @@ def point_echoes(place, sigma=1.0):
 
 
 def slot_phases(speed):
-    """Phase of an echo that closes, by transmitter against TX1: as simulated, and -4 pi v Tc / lambda a slot, rad."""
+    """Return the phase of a closing echo by transmitter relative to TX1, rad: simulated, and -4 pi v Tc / lambda per
+    slot."""
     place = polar(3.0)
     still = burst(CONFIG, point_echoes(place), Rig())
     moving = burst(CONFIG, point_echoes(place), Rig(velocity=(speed, 0, 0)))
@@ -31,7 +32,7 @@ def slot_phases(speed):
 
 
 def tone_ranges(signal, near):
-    """Range that the tone of each of TX1-RX1's chirps stands for, by a line through its phase."""
+    """Return the range by the beat frequency of each chirp of TX1-RX1, from a line fitted to its phase, m."""
     n = np.arange(CONFIG.samples) / CONFIG.sample_rate
     expected = 2 * CONFIG.slope * near / SPEED_OF_LIGHT
     phase = np.unwrap(np.angle(signal[:, 0, 0] * np.exp(-2j * np.pi * expected * n)), axis=1)

@@ -19,20 +19,20 @@ CONFIG = PRESETS["radarize"]
 
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
-#: Behind the radar, where it sees nothing: a scene has to have something that stands.
+#: A static object behind the radar, which is invisible: a scene must have one.
 BEHIND = SceneObject("behind", shapes.rectangle((-9, 0, 0), (0.1, 0.1), (-1, 0, 0)), MATERIALS["wood"])
 
 HINGE, WIDTH, HEIGHT, THICKNESS = np.array([2.0, -0.45, 0.0]), 0.9, 2.0, 0.04
 
 
 def door(angle, material="wood", **values):
-    """One that stands still at an angle, deg from the x axis, if nothing else is said."""
+    """Return a door, by default at rest at an angle from the x axis, deg."""
     place = {"hinge": tuple(HINGE), "width": WIDTH, "height": HEIGHT, "thickness": THICKNESS}
     return Door(name="door", material=material, **(place | {"angles": (angle, angle)} | values))
 
 
 def finder(things, movers=(), surface=NOTHING):
-    """Of a scene with some things, and movers without scatterers of their own."""
+    """Return a path finder of a scene with static objects, and moving ones without scatterers."""
     scene = Scene("door", [BEHIND, *things])
     moving = MovingTargets(list(movers), np.random.default_rng(0))
     moving.sigma[:] = 1e-30
@@ -41,11 +41,11 @@ def finder(things, movers=(), surface=NOTHING):
 
 
 def swinging(angle):
-    """A door on its way, at an angle (deg) at the time `MIDDLE`, some 0.8 rad/s fast."""
+    """Return a swinging door at an angle (deg) at the time `MIDDLE`, with about 0.8 rad/s."""
     return door(0, angles=(angle - 30, angle + 30), period=4.0)
 
 
-#: The middle of a burst, s, and the ends of it and the middle after that.
+#: Time of the middle of a burst, s; half its duration, s; its start, middle and end in units of that.
 MIDDLE = 1.0
 
 HALF = (CONFIG.chirp_times.max() - CONFIG.chirp_times.min()) / 2
@@ -54,12 +54,13 @@ INSTANTS = np.array([-1.0, 0.0, 1.0])
 
 
 def foot_speed(mover):
-    """At which the point of a swinging door nearest the radar closes in at `MIDDLE`, m/s: omega times its way along."""
+    """Return the closing speed at `MIDDLE` of the swinging door's point nearest to the radar, m/s: angular rate times
+    distance from the hinge."""
     angle, rate = np.deg2rad(np.mean(mover.angles)), np.pi / mover.period * np.deg2rad(np.ptp(mover.angles))
     return -rate * HINGE @ [np.cos(angle), np.sin(angle), 0.0]
 
 
 def lengths(echoes):
-    """Paths of echoes at the instants, (echo, virtual, instant), m."""
+    """Return the path lengths of echoes at the start, middle and end of the burst, (echo, virtual, time), m."""
     fit = echoes.lengths(CONFIG, Rig(), MIDDLE - CONFIG.burst_center)
     return np.stack([fit @ [1, s, s * s] for s in INSTANTS], axis=-1)

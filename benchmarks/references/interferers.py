@@ -18,21 +18,21 @@ FAR = {"name": "post", "shape": "box", "size": [0.1, 0.1, 0.1], "position": [0, 
 
 
 def scenario(*others: dict, front_end=IDEAL, motion=None, config=CONFIG, objects=(FAR,)) -> Scenario:
-    """A radar at the origin, and others around it in a world that is all but empty."""
+    """Return a scenario of a radar at the origin, and others around it in a nearly empty scene."""
     named = [{"name": str(k), **other} for k, other in enumerate(others)]
     scene = Scene.of({"objects": list(objects), "interferers": named}, "place")
     return Scenario(scene, motion or Motion.still((0, 0, 0)), config, front_end)
 
 
 def facing(distance: float, bearing: float = 0.0, **fields) -> dict:
-    """A radar at a distance and bearing (degrees) that faces the origin."""
+    """Return a radar at a distance and bearing (deg) that faces the origin."""
     angle = np.deg2rad(bearing)
     place = [distance * np.cos(angle), distance * np.sin(angle), 0.0]
     return {"position": place, "yaw": 180 + bearing, "radar": {"loops": 8}} | fields
 
 
 def schedule(radar, clock):
-    """Phase in cycles that a radar sends by its clock since its first frame (s), and its transmitter; -1: silent."""
+    """Return transmitted phase (cycles) and transmitter (-1: none) of a radar at times of its clock (s)."""
     frame = np.floor(clock / radar.frame_period)
     chirp = np.floor((clock - frame * radar.frame_period) / radar.chirp_time)
     into = clock - frame * radar.frame_period - chirp * radar.chirp_time - radar.idle_time
@@ -42,9 +42,10 @@ def schedule(radar, clock):
 
 
 def brute_force(made: Scenario, time: float, loop: int, tx: int, rx: int, fine: int = 4096) -> np.ndarray:
-    """Samples of a chirp: both waveforms' product in small steps over the whole ramp, filtered in small steps.
+    """Compute the samples of a chirp: the product of both waveforms in small steps over the ramp, filtered in small
+    steps.
 
-    An independent sum: the schedules of both radars as they are written, no frequency and no crossing looked for.
+    An independent sum from the schedules of both radars, without a search of frequencies or crossings.
     """
     config, (other,) = made.config, made.scene.interferers
     begin = time + (loop * len(config.tx_order) + config.slot[tx]) * config.chirp_time + config.idle_time

@@ -10,7 +10,7 @@ LAMBDA = CONFIG.wavelength
 
 
 def physical_optics(half, position, across=3001):
-    """(1 / 4 pi) sum of cos exp(j 2 k rho) / rho^2 dA over the plate."""
+    """Return the echo amplitude by physical optics: (1 / 4 pi) sum of cos exp(j 2 k rho) / rho^2 dA over the plate."""
     y = ((np.arange(across) + 0.5) / across * 2 - 1) * half[0]
     z = ((np.arange(across) + 0.5) / across * 2 - 1) * half[1]
     area = (2 * half[0] / across) * (2 * half[1] / across)

@@ -21,7 +21,7 @@ WALL = SceneObject("wall", shapes.rectangle((2, 0, 0), (6, 6), (-1, 0, 0)), MATE
 
 
 def left(walls, things, path):
-    """What things that stand in the way, and do not echo, leave of the images at a path length, dB."""
+    """Return the level of the images at a path length behind obstacles without echoes, relative to free sight, dB."""
     reflectors = Reflectors.of(Scene("walls", walls), CONFIG)
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     fields = []
@@ -33,16 +33,17 @@ def left(walls, things, path):
 
 
 def pole(x, y, radius=0.005, tilt=0.0):
-    """A thin pole that leans in the plane across the way."""
+    """Return a thin pole that is tilted in the plane across the path."""
     upright = shapes.cylinder((0, 0, 0), radius, 3.0, 24)
     return SceneObject("pole", shapes.placed(upright, (x, y, 0.0), (tilt, 0.0, 0.0)), MATERIALS["metal"])
 
 
-#: Of the pole's offsets, m: steps of 6 mm through the first zones.
+#: Offsets of the pole, m: steps of 6 mm through the first Fresnel zones.
 OFFSETS = np.arange(-7, 8) * 0.006
 
 
 def wall_past_pole(offsets=OFFSETS, distance=1.0):
-    """Kirchhoff's and the simulated level of a wall's flash, 2 m away, past a pole of 1 cm at a distance, dB."""
+    """Return the level of a wall's specular reflection at 2 m past a pole of 1 cm at a distance, dB: by Kirchhoff's
+    integral, and simulated."""
     truth = [20 * np.log10(abs(past_pole(y, 0.01, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
     return np.array(truth), np.array([left([WALL], [pole(distance, y)], 4.0) for y in offsets])

@@ -21,7 +21,7 @@ DOOR = sheet("door", "metal", (2.0, 0, 0), (3.0, 2.4), (-1, 0, 0))
 
 
 def there_and_back(echoes, place):
-    """Field of each echo from one antenna beside a place to another, and with TX and RX swapped."""
+    """Return the field of each echo from one antenna beside a position to another, and with TX and RX exchanged."""
 
     def field(tx, rx):
         lengths = np.empty(len(echoes))

@@ -1,4 +1,4 @@
-"""Motions and measurements that the physics tests share."""
+"""Motions and measurements for the physics tests."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ from radarsim.propagation.reflectors import Flat
 from radarsim.receiver.synthesis import Synthesizer
 
 ISOTROPIC = (np.ones(181), np.ones(181), 1.0)
-#: The pattern of the elements of the presets' board.
+#: Antenna pattern of the presets' board.
 ELEMENT = gain_pattern(Antenna.of("iwr1843boost"))
 
 
 @dataclass
 class Rig:
-    """A body at constant velocity and yaw rate, the sensor on a lever arm (body frame)."""
+    """A body with constant velocity and yaw rate, and a sensor on a lever arm (body frame)."""
 
     velocity: tuple = (0.0, 0.0, 0.0)
     yaw_rate: float = 0.0
@@ -36,13 +36,13 @@ class Rig:
 
 
 def layer(gamma=-1.0):
-    """A half space that reflects so, head on (TE); a conductor for -1."""
+    """Return a half space with a reflection coefficient at normal incidence (TE); a conductor for -1."""
     eps = complex(1, -np.inf) if gamma == -1 else ((1 - gamma) / (1 + gamma)) ** 2
     return np.array([eps, 0, 0, gamma, 1], complex)
 
 
 def conductors(*plates, gamma=-1.0):
-    """Conducting rectangles: (centre, side directions u and v, half sides); the normal is u x v."""
+    """Return conducting rectangles of (centre, side directions u and v, half sides); the normal is u x v."""
     center, u, v, half = (np.array(column, float) for column in zip(*plates, strict=True))
     none, n = np.zeros(len(plates), bool), len(plates)
     u_, v_ = half[:, :1] * u, half[:, 1:] * v
@@ -54,35 +54,35 @@ def conductors(*plates, gamma=-1.0):
 
 
 def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):
-    """Point at a range and direction from the origin."""
+    """Return the point at a range and direction from the origin."""
     a, e = np.deg2rad([azimuth_deg, elevation_deg])
     return range_ * np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
 
 
 def isotropic(position, wavelength, rotation=None, range_=100.0):
-    """A search for all that an isotropic antenna receives at a place, frame 0."""
+    """Return an observation with an isotropic antenna at a position, frame 0."""
     rotation = np.eye(3) if rotation is None else rotation
     place = np.asarray(position, float)[None]
     return Observation(place, rotation[None], np.zeros(1), range_, wavelength, 0.0, *ISOTROPIC)
 
 
 def field(echoes, position, wavelength):
-    """Sum of all echoes at one antenna at a position, at one frequency."""
+    """Return the sum of all echoes at one antenna at a position, at one frequency."""
     lengths = np.linalg.norm(echoes.apparent(position) - position, axis=2).sum(axis=1)
     return complex(np.sum(echoes.amplitude * np.exp(2j * np.pi * lengths / wavelength)))
 
 
 def burst(config, echoes, motion, time=0.0):
-    """Beat signal of echoes by the fast synthesis."""
+    """Return the beat signal of echoes by the fast synthesis."""
     return Synthesizer(config)(echoes.lengths(config, motion, time), echoes.amplitude)
 
 
 def locate(config: RadarConfig, signal, guess):
-    """Range, azimuth, elevation (rad), closing speed and amplitude of the strongest echo, by the matched filter.
+    """Estimate range, azimuth, elevation (rad), closing speed and amplitude of the strongest echo by a matched filter.
 
-    Fails on silence, in which everything would be at its place.
+    Fails without a signal.
 
-    A far-field, constant-velocity signal model written from the definitions, not from the synthesis: phase
+    The signal model (far field, constant velocity) is derived from the definitions, not from the synthesis: phase
     -2 pi / lambda (antenna . u) over antennas, closing echoes at exp(-j 4 pi v t / lambda), beat frequency from range
     and the Doppler shift within the ramp.
     """

@@ -13,7 +13,8 @@ CONFIG = PRESETS["radarize"]
 
 
 def ridge(rig):
-    """Doppler-azimuth map, noise included, of a ring of clutter around the rig; and the ridge's speed by column."""
+    """Return the Doppler-azimuth map, with noise, of a ring of clutter around the rig, and the ridge's speed by
+    column."""
     rng = np.random.default_rng(7)
     n = 4000
     azimuth, range_ = rng.uniform(-np.pi / 2, np.pi / 2, n), rng.uniform(1.5, 4.0, n)

@@ -24,25 +24,26 @@ def reflectors(mesh, material="metal"):
 
 
 def ahead(position):
-    """A rotation of the radar that looks from there at the origin."""
+    """Return the rotation of a radar at a position that faces the origin."""
     way = -np.asarray(position, float) / np.linalg.norm(position)
     return Rotation.align_vectors([way], [[1.0, 0.0, 0.0]])[0].as_matrix()
 
 
 def field(found, position):
-    """Echo of smooth surfaces, isotropic antenna."""
+    """Return the echo of smooth surfaces, with an isotropic antenna."""
     position = np.asarray(position, float)
     return summed(patches.specular_points(isotropic(position, LAMBDA, ahead(position)), 0, found.smooth), position)
 
 
 def summed(points, position):
-    """Sum of the echoes of curved reflectors at a position, each with its path's phase."""
+    """Sum the echoes of curved reflectors at a position, each with the phase of its path."""
     path = [path_over(geometry, tuple(position), tuple(position)) for geometry in points.geometry]
     return np.sum(points.amplitude * np.exp(2j * np.pi * np.array(path) / LAMBDA))
 
 
 def physical_optics(surface, position, soft=0.3):
-    """-(1 / 4 pi j) sum of cos exp(j 2 k rho) / rho^2 dA over the lit side of a conductor, tapered to the shadow."""
+    """Return the echo amplitude by physical optics: -(1 / 4 pi j) sum of cos exp(j 2 k rho) / rho^2 dA over the lit
+    side of a conductor, tapered to the shadow."""
     place, normal, area = surface
     away = np.asarray(position, float) - place
     rho = np.linalg.norm(away, axis=1)
@@ -53,7 +54,7 @@ def physical_optics(surface, position, soft=0.3):
 
 
 def grid(first, second, sizes):
-    """Midpoints of two stretches, every one with every other, and the size of a cell."""
+    """Return all pairs of the midpoints of two intervals, and the area of a cell."""
     (a, b), (c, d), (n, m) = first, second, sizes
     x, y = a + (np.arange(n) + 0.5) / n * (b - a), c + (np.arange(m) + 0.5) / m * (d - c)
     x, y = (each.ravel() for each in np.meshgrid(x, y, indexing="ij"))
@@ -61,7 +62,7 @@ def grid(first, second, sizes):
 
 
 def ellipsoid(axes, fine=1200):
-    """Places, normals and areas."""
+    """Return positions, normals and areas of the surface elements of an ellipsoid."""
     theta, phi, cell = grid((0, np.pi), (0, 2 * np.pi), (fine // 2, fine))
     way = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
     gradient = way / axes
@@ -76,7 +77,7 @@ def tube(radius, half, begin, end, fine=(600, 1200)):
 
 
 def rounded(radius, half):
-    """A cylinder with hemispheres on its ends."""
+    """Return the surface elements of a cylinder with hemispheres on its ends."""
     theta, phi, cell = grid((0, np.pi / 2), (0, 2 * np.pi), (250, 900))
     parts = [tube(radius, half, 0, 2 * np.pi)]
     for s in (1, -1):
@@ -86,7 +87,7 @@ def rounded(radius, half):
 
 
 def half_cylinder(radius, height, sides, back=True):
-    """Its round side faces -x."""
+    """Return the mesh of half a cylinder, whose curved side faces -x."""
     angle = np.linspace(np.pi / 2, 3 * np.pi / 2, sides + 1)
     ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     low = np.column_stack([ring, np.full(sides + 1, -height / 2)])

@@ -13,7 +13,8 @@ HERE, AHEAD = np.zeros(3), np.eye(3)
 
 
 def speckle(places):
-    """Amplitudes of many scatterers in a cell, from places so far apart that the field decorrelates; RMS sqrt(2)."""
+    """Return amplitudes of many scatterers in a cell, from positions at which the field is uncorrelated; RMS
+    sqrt(2)."""
     rng = np.random.default_rng(5)
     place = np.stack([np.full(20000, 3.0), rng.uniform(-3, 3, 20000), rng.uniform(-1.0, 1.0, 20000)], axis=1)
     scatterers = Scatterers.points(place, np.ones(20000), rng.uniform(0, 2 * np.pi, 20000))

@@ -1,4 +1,4 @@
-"""What odometry by a network has in common that reads an IMU."""
+"""Base class of odometry by networks that read an IMU."""
 
 from radarize.learning.nets.weights import Network, load
 from radarize.odometry.displacements import DisplacementIntegrator
@@ -7,13 +7,14 @@ from radarize.pipeline.method import Inputs
 
 
 class InertialOdometry:
-    """A trained network, the IMU that it reads, and the path that displacements make.
+    """Odometry by a trained network that estimates displacements from an IMU, which are integrated to a path.
 
     Args:
-        inputs: with the recording that holds the IMU, and the weights.
+        inputs: recording with the IMU, and weights.
 
     Attributes:
-        network, lasts: set by the subclass; the latter is over how many seconds displacements are told.
+        network: class of the network; set by the subclass.
+        lasts: time span of a displacement, s; set by the subclass.
 
     Raises:
         InputError: no recording, no IMU, or no such weights.

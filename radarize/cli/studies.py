@@ -93,7 +93,7 @@ def benchmark(
     ] = None,
     train: Annotated[bool, typer.Option("--train", help="Train the networks on each split first.")] = False,
     epochs: Annotated[int | None, typer.Option(min=1, help="Maximum number of epochs of that training.")] = None,
-    protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper, or corrected; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Number of processes; by default one per core.")] = None,
     ray: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Address of a Ray cluster; auto: of this machine.")
@@ -127,7 +127,7 @@ def benchmark(
     chosen = [method for word in methods or () for method in word.split(",")]
     options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
     with progress("benchmark", f"finished parts are kept in {out}; the same command continues") as report:
-        published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
+        published = compare(name, data, out, options, progress=report, log=lambda line: typer.echo(line, err=True))
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")

@@ -1,4 +1,4 @@
-"""A whole run against the truth: trajectories, map, scans, velocities."""
+"""Errors of a run: trajectories, map, scans, velocities."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
 
-from radarize.evaluation.claims import pose_nees
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
+from radarize.evaluation.nees import pose_nees
 from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.io.alignment import Association, load, matched, trajectory, yaws
 from radarize.io.errors import InputError
@@ -19,14 +19,15 @@ from radarize.pipeline.runfolder import RunFolder
 def trajectory_errors(
     run: Path | RunFolder, reference: Path | None = None, association: Association = "interpolate"
 ) -> dict[str, TrajectoryErrors]:
-    """Errors of the run's trajectories, by ``odometry`` and ``slam``.
+    """Return errors of a run's trajectories, by ``odometry`` and ``slam``.
 
     Args:
-        reference: TUM file of the truth; by default the run's ``reference.tum``.
+        run: folder of a run.
+        reference: TUM file of true poses; by default the run's ``reference.tum``.
         association: see `radarize.io.alignment.matched`.
 
     Raises:
-        InputError: not a run, no reference, or nothing that matches.
+        InputError: not a run, no reference, or no matching poses.
     """
     run = run if isinstance(run, RunFolder) else RunFolder(run)
     path = reference or run.path / "reference.tum"
@@ -40,13 +41,14 @@ def trajectory_errors(
 
 
 def trajectories(run: RunFolder) -> dict[str, PoseTrajectory3D]:
-    """Of odometry, if there is any, and of SLAM."""
+    """Return the trajectories of a run: ``odometry``, if it has one, and ``slam``."""
     found = {"odometry": run.odometry, "slam": run.trajectory}
     return {name: trajectory(*poses) for name, poses in found.items() if poses is not None}
 
 
 def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...]:
-    """Positions, yaw, azimuths and ranges of what the radar could return, in the reference's frame."""
+    """Return positions, yaw, azimuths and ranges of the true scans within the radar's field of view, in the frame of
+    the reference."""
     azimuths = scans["truth/scan_azimuths"]
     inside = (azimuths >= scans["azimuths"].min()) & (azimuths <= scans["azimuths"].max())
     still = np.zeros((len(scans["time"]), 7))
@@ -59,20 +61,21 @@ def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tupl
 def evaluate(
     run: Path | RunFolder, reference: Path | None = None, errors: dict[str, TrajectoryErrors] | None = None
 ) -> dict[str, object]:
-    """Compare a run with the truth. Nothing is written, see `RunFolder.write_metrics`.
+    """Compare a run with the truth. Nothing is written; see `RunFolder.write_metrics`.
 
     Args:
-        reference: TUM file of the truth; by default the run's ``reference.tum``.
-        errors: of its trajectories (`trajectory_errors`), where they are at hand.
+        run: folder of a run.
+        reference: TUM file of true poses; by default the run's ``reference.tum``.
+        errors: result of `trajectory_errors`, if it is known already.
 
     Returns:
-        ``slam`` and ``odometry``: `TrajectoryErrors.summary`, of SLAM with ``nees``, see
-        `radarize.evaluation.claims.pose_nees`. Where the run knows the truth about them, ``map``:
-        `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
-        Where the run tells it, ``blind``: `radarize.odometry.observability.UnobservableSpans`.
+        ``slam`` and ``odometry``: `TrajectoryErrors.summary`, for SLAM with ``nees`` by
+        `radarize.evaluation.nees.pose_nees`. If the run has their truth, ``map``: `map_errors`, ``scans``:
+        `scan_errors`, ``velocity``: `velocity_errors`. Values that do not exist are None.
+        Spans of the run with unobservable motion, key "blind": `radarize.odometry.observability.UnobservableSpans`.
 
     Raises:
-        InputError: not a run, no truth, or nothing that matches.
+        InputError: not a run, no truth, or no matching poses.
     """
     run = run if isinstance(run, RunFolder) else RunFolder(run)
     errors = errors or trajectory_errors(run, reference)

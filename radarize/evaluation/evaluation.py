@@ -1,4 +1,4 @@
-"""A run against the truth."""
+"""Evaluation of a run against the truth, in Python."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Evaluation(Mapping[str, object]):
-    """Errors of a run: a mapping as in ``metrics.json``, and tables of it.
+    """Errors of a run: a mapping with the content of ``metrics.json``, which prints as tables.
 
     Example:
         >>> print(rz.evaluate("RUN"))
@@ -38,12 +38,12 @@ class Evaluation(Mapping[str, object]):
 
     @property
     def method(self) -> str:
-        """What the run was made with."""
+        """Methods of the run."""
         return methods(self._run.folder)
 
     @property
     def tables(self) -> Iterator[words.PrintedTable | str]:
-        """Tables and sentences, for a page or a terminal."""
+        """Tables and sentences for a page or a terminal."""
         return words.everything(self._figures)
 
     def __str__(self) -> str:
@@ -55,20 +55,20 @@ class Evaluation(Mapping[str, object]):
         )
 
     def to_json(self) -> str:
-        """As ``metrics.json`` has it."""
+        """Return the content of ``metrics.json``."""
         return json.dumps(self._figures, indent=2)
 
     def to_pandas(self) -> "pandas.Series":
-        """One number a row, by dotted name: ``slam.ate.position.mean`` in m, ..."""
+        """Return one metric per row, by dotted name: ``slam.ate.position.mean`` in m, ..."""
         import pandas
 
         return pandas.json_normalize(self._figures).iloc[0]
 
     def save(self) -> Path:
-        """Write ``metrics.json`` into the run's folder.
+        """Write ``metrics.json`` into the folder of the run.
 
         Raises:
-            InputError: it cannot be written.
+            InputError: the file cannot be written.
         """
         self._run.folder.write_metrics(self._figures)
         return self._run.path / "metrics.json"
@@ -78,20 +78,20 @@ def evaluate(run: Run | str | Path, *, reference: str | Path | None = None) -> E
     """Compare a run with the truth: trajectories (ATE, RE; by evo), map, scans, velocities.
 
     Args:
-        run: what `run` returned, or a folder of ``radarize run``.
-        reference: true poses (TUM); by default the run's own, which a simulated recording brings along.
+        run: result of `run`, or a folder of ``radarize run``.
+        reference: TUM file of true poses; by default those of the run, which a simulated recording contains.
 
     Returns:
-        ``slam`` and ``odometry``: errors of the trajectories in m and rad; ``map``, ``scans``, ``velocity`` where the
-        truth about them is known; see `radarize.evaluation.evaluate.evaluate`. ``print`` shows tables.
+        ``slam`` and ``odometry``: errors of the trajectories in m and rad; ``map``, ``scans``, ``velocity`` if their
+        truth is known; see `radarize.evaluation.evaluate.evaluate`. ``print`` shows tables.
 
     Raises:
-        InputError: not a run, no truth, or nothing that matches.
+        InputError: not a run, no truth, or no matching poses.
 
     Example:
         >>> found = rz.evaluate("RUN")
-        >>> sorted(found)
-        ['blind', 'map', 'odometry', 'reference', 'scans', 'slam', 'velocity']
+        >>> {"map", "odometry", "scans", "slam", "velocity"} <= set(found)
+        True
         >>> round(float(found.to_pandas()["odometry.distance"]), 1)  # m
         0.4
     """
@@ -105,7 +105,7 @@ def _frame(table: words.PrintedTable) -> "pandas.DataFrame":
 
 
 def _plain(table: words.PrintedTable) -> str:
-    """A table as text of even columns."""
+    """Format a table as text with aligned columns."""
     rows = [tuple(table.head), *table.rows]
     widths = [max(len(row[k]) for row in rows) for k in range(len(table.head))]
     return "\n".join(

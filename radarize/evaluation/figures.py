@@ -1,14 +1,14 @@
-"""What a figure is called, and where it stands in what `radarize.evaluation` found."""
+"""Metrics in tables: name, unit, and path in the results of `radarize.evaluation`."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-#: What stands where there is no figure.
+#: Text for a missing value.
 NONE = "-"
 
 
 class Figure(NamedTuple):
-    """A figure: words, where it stands (keys with dots), unit and factor, format, meaning."""
+    """A metric: name, path of keys with dots, unit and factor to it, format, explanation."""
 
     words: str
     path: str
@@ -19,11 +19,11 @@ class Figure(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Words and unit."""
+        """Name and unit."""
         return f"{self.words}, {self.unit}"
 
     def text(self, metrics: Mapping[str, object], unit: bool = True) -> str:
-        """Value and unit; metrics are nested."""
+        """Format the value of the metric in nested results, with its unit."""
         value: Any = metrics
         for key in self.path.split("."):
             value = (value or {}).get(key)

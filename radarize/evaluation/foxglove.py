@@ -1,13 +1,13 @@
-"""What a pipeline finds as Foxglove's messages, and a server of them.
+"""Results of a pipeline as Foxglove messages, and a server for them.
 
-    /tf         map -> odom -> base_link -> radar, as ROS has them (REP 105)
+    /tf         map -> odom -> base_link -> radar, as in ROS (REP 105)
     /scan       LaserScan, in `radar`        /path  PosesInFrame, in `map`
     /map        Grid, in `map`: occupancy of 0, 100 or -1, as in nav_msgs/OccupancyGrid
     /radar/...  heat maps and, of a simulated recording, path types as images; /radar/points  PointCloud, in `radar`
-    /truth/path  PosesInFrame, in `world`, whose `truth` is where the radar really is
+    /truth/path  PosesInFrame, in `world`; the frame `truth` has the true pose of the radar
     /camera/depth/image_rect_raw  RawImage (16UC1, mm) and /camera/depth/camera_info
 
-``base_link`` is the radar: x forward, y left, z up (REP 103). Poses lie in a plane, but for those of the truth.
+``base_link`` is the radar: x forward, y left, z up (REP 103). Poses are planar, except the true ones.
 """
 
 import math
@@ -28,10 +28,10 @@ _OCCUPANCY = messages.PackedElementField(name="occupancy", offset=0, type=messag
 
 
 class Messages:
-    """What is shown, as Foxglove's messages; times are stamps, s.
+    """Publisher of Foxglove messages; times are time stamps in s.
 
     Args:
-        context: what the messages go to.
+        context: Foxglove context to publish to.
     """
 
     def __init__(self, context: foxglove.Context):
@@ -47,7 +47,7 @@ class Messages:
         self._pictures: dict[str, channels.RawImageChannel] = {}
 
     def pose(self, time: float, slam: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "3"]) -> None:
-        """Where the radar is by SLAM (in `map`) and by odometry alone (in `odom`)."""
+        """Publish the pose of the radar by SLAM (in `map`) and by odometry (in `odom`)."""
         links = (
             ("map", "odom", compose(slam, inverse(odometry))),
             ("odom", "base_link", odometry),
@@ -65,7 +65,7 @@ class Messages:
     def scan(
         self, time: float, ranges: Float[np.ndarray, "beam"], azimuths: Float[np.ndarray, "beam"] = BEARINGS
     ) -> None:
-        """Ranges, m, inf where nothing is seen, at azimuths that are equally far apart, rad."""
+        """Publish a scan: ranges (m; inf without a return) at uniformly spaced azimuths (rad)."""
         self._scan.log(
             messages.LaserScan(
                 timestamp=_stamp(time), frame_id="radar", pose=_pose(_HERE), start_angle=float(azimuths[0]),
@@ -75,12 +75,12 @@ class Messages:
         )  # fmt: skip
 
     def path(self, time: float, poses: Float[np.ndarray, "node 3"]) -> None:
-        """The way so far, in `map`."""
+        """Publish the path so far, in `map`."""
         way = messages.PosesInFrame(timestamp=_stamp(time), frame_id="map", poses=[_pose(pose) for pose in poses])
         self._path.log(way, log_time=_nanoseconds(time))
 
     def map(self, time: float, found: OccupancyMap) -> None:
-        """The map so far."""
+        """Publish the map so far."""
         rows, columns = found.pixels.shape
         cells = np.where(found.occupied, 100, np.where(found.free, 0, -1)).astype(np.int8)[::-1]
         self._map.log(
@@ -93,7 +93,7 @@ class Messages:
         )  # fmt: skip
 
     def links(self, time: float, links: Sequence[tuple[str, str, Float[np.ndarray, "7"]]]) -> None:
-        """Transforms: parent, child, and x y z (m) qx qy qz qw of the child in the parent."""
+        """Publish transforms: parent, child, and x y z (m) qx qy qz qw of the child in the parent."""
         transforms = [
             messages.FrameTransform(
                 timestamp=_stamp(time), parent_frame_id=parent, child_frame_id=child,
@@ -104,13 +104,13 @@ class Messages:
         self._tf.log(messages.FrameTransforms(transforms=transforms), log_time=_nanoseconds(time))
 
     def true_path(self, time: float, poses: Float[np.ndarray, "pose 7"]) -> None:
-        """The true way, in `world`."""
+        """Publish the true path, in `world`."""
         way = [messages.Pose(position=_vector(pose[:3]), orientation=_quaternion(pose[3:])) for pose in poses]
         found = messages.PosesInFrame(timestamp=_stamp(time), frame_id="world", poses=way)
         self._true_path.log(found, log_time=_nanoseconds(time))
 
     def points(self, time: float, cloud: Float[np.ndarray, "point column"], names: Sequence[str]) -> None:
-        """Points of a frame, in `radar`; columns by name, x, y and z (m) among them."""
+        """Publish the points of a frame, in `radar`; named columns include x, y and z (m)."""
         float32 = messages.PackedElementFieldNumericType.Float32
         fields = [messages.PackedElementField(name=name, offset=4 * k, type=float32) for k, name in enumerate(names)]
         self._points.log(
@@ -124,7 +124,7 @@ class Messages:
     def depth(
         self, time: float, picture: UInt16[np.ndarray, "row column"], pinhole: Float[np.ndarray, "4"] | None
     ) -> None:
-        """A depth picture, mm, and fx, fy, cx, cy (pixels) of its lens."""
+        """Publish a depth picture (mm), and the intrinsics fx, fy, cx, cy (pixels) of its camera."""
         rows, columns = picture.shape
         image = messages.RawImage(
             timestamp=_stamp(time), frame_id="camera_depth_optical_frame", width=columns, height=rows,
@@ -141,7 +141,7 @@ class Messages:
             self._lens.log(lens, log_time=_nanoseconds(time))
 
     def picture(self, time: float, name: str, pixels: UInt8[np.ndarray, "row column color"]) -> None:
-        """A heat map; colours are red, green, blue and maybe alpha."""
+        """Publish a heat map as an image with channels red, green, blue and optionally alpha."""
         if name not in self._pictures:
             self._pictures[name] = channels.RawImageChannel(f"/radar/{name}", context=self._context)
         rows, columns, colors = pixels.shape
@@ -154,13 +154,13 @@ class Messages:
 
 
 class Server(Messages):
-    """Serves what is shown to Foxglove; use as a context manager.
+    """Server for Foxglove; use as a context manager.
 
     Args:
-        address: to listen on, ``HOST:PORT``; port 0 takes a free one.
+        address: address to listen on, ``HOST:PORT``; port 0 selects a free one.
 
     Attributes:
-        url: for "Open connection" in Foxglove.
+        url: URL for "Open connection" in Foxglove.
 
     Raises:
         InputError: the address cannot be used.
@@ -175,7 +175,7 @@ class Server(Messages):
                 name="radarize", host=host or "127.0.0.1", port=int(port), context=context
             )
         except (OSError, ValueError, OverflowError, RuntimeError) as error:
-            raise InputError(f"--foxglove {address}: {error}, expected HOST:PORT to be found at") from error
+            raise InputError(f"--foxglove {address}: {error}, expected HOST:PORT to listen on") from error
         self.url = f"ws://{host or '127.0.0.1'}:{self._server.port}"
 
     def __enter__(self) -> "Server":

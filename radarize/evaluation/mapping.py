@@ -1,4 +1,4 @@
-"""Maps against the floor plan."""
+"""Errors of occupancy maps against a floor plan."""
 
 import numpy as np
 import shapely
@@ -11,14 +11,14 @@ from radarize.pipeline.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
 
-#: m: a mapped point this near to a true surface counts as right.
+#: Maximum distance of a correct map cell from a true surface, m.
 TOLERANCE = 0.10
-#: m: spacing of the points that stand for a wall.
+#: Spacing of the points that represent a wall, m.
 SPACING = 0.02
 
 
 def segment_points(plan: Float[np.ndarray, "segment 4"], spacing: float = SPACING) -> Float[np.ndarray, "point 2"]:
-    """Points along segments (x0 y0 x1 y1), at most `spacing` apart, so that each stands for the same length."""
+    """Return points along segments (x0 y0 x1 y1), at most `spacing` apart, each for nearly the same length, m."""
     plan = np.asarray(plan, float).reshape(-1, 4)
     start, end = plan[:, :2], plan[:, 2:]
     counts = np.maximum(np.ceil(np.linalg.norm(end - start, axis=1) / spacing).astype(int), 1)
@@ -30,7 +30,7 @@ def segment_points(plan: Float[np.ndarray, "segment 4"], spacing: float = SPACIN
 def distance_to_plan(
     points: Float[np.ndarray, "point 2"], plan: Float[np.ndarray, "segment 4"]
 ) -> Float[np.ndarray, "point"]:
-    """Distance of each point to the nearest segment, m."""
+    """Return the distance of each point to the nearest segment, m."""
     walls = shapely.multilinestrings(shapely.linestrings(np.reshape(plan, (-1, 2, 2)).astype(float)))
     shapely.prepare(walls)
     return shapely.distance(walls, shapely.points(points))
@@ -42,13 +42,13 @@ def scan_endpoints(
     azimuths: Float[np.ndarray, "beam"],
     ranges: Float[np.ndarray, "scan beam"],
 ) -> Float[np.ndarray, "end 2"]:
-    """Where the beams that returned anything end, m, in the frame of the poses."""
+    """Return the end points of beams with a return, m, in the frame of the poses."""
     hit = np.isfinite(ranges) & (ranges > 0)
     return _ends(positions, yaw, azimuths, np.where(hit, ranges, 0))[hit]
 
 
 def _ends(positions: np.ndarray, yaw: np.ndarray, azimuths: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Ends of beams of some lengths, (scan, beam, 2); arguments as of `scan_endpoints`."""
+    """Return the ends of beams of given lengths, (scan, beam, 2); arguments as in `scan_endpoints`."""
     bearing = yaw[:, None] + azimuths
     return positions[:, None] + lengths[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
 
@@ -60,26 +60,26 @@ def map_errors(
     shift: Float[np.ndarray, "3"],
     seen: Float[np.ndarray, "end 2"] | None = None,
 ) -> dict[str, float]:
-    """Occupied cells against a floor plan.
+    """Compare the occupied cells of a map with a floor plan.
 
     Args:
-        grid: map in the estimate's frame.
-        plan: wall segments in the reference's frame, m.
-        turn, shift: alignment of the trajectory, from the estimate's to the reference's frame.
-        seen: ends of true beams within the radar's reach, in the reference's frame; recall is of those parts of the
-            plan that they touch, and of the whole plan if None.
+        grid: map in the frame of the estimate.
+        plan: wall segments in the frame of the reference, m.
+        turn, shift: alignment of the trajectory, from the frame of the estimate to that of the reference.
+        seen: ends of true beams within the radar's range, in the frame of the reference; recall is of the parts of the
+            plan that they hit, and of the whole plan if None.
 
     Returns:
         ``precision``: share of occupied cells within 10 cm of a wall. ``recall``: share of the wall's length within
         10 cm of an occupied cell. ``f1``: their harmonic mean. ``chamfer``: mean of the mean distances both ways, m.
-        ``cells``, ``seen_length`` (m): how many and how much that was about.
-        An empty map recalls nothing, and its precision is NaN.
+        ``cells``: number of occupied cells. ``seen_length``: length of the compared parts of the plan, m.
+        An empty map has a recall of 0 and a precision of NaN.
     """
     cells = grid.centers(grid.occupied)
     cells = (np.column_stack([cells, np.zeros(len(cells))]) @ turn.T + shift)[:, :2]
     walls = segment_points(plan)
     if seen is not None:
-        walls = walls[cKDTree(seen).query(walls)[0] <= TOLERANCE]  # what the sensor had a chance to map
+        walls = walls[cKDTree(seen).query(walls)[0] <= TOLERANCE]  # parts visible to the sensor
     about = {"cells": len(cells), "seen_length": len(walls) * SPACING}
     if not len(cells) or not len(walls):
         return {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan} | about
@@ -91,15 +91,15 @@ def map_errors(
 def agreement(
     off_surface: Float[np.ndarray, "cell"], off_map: Float[np.ndarray, "point"], near: float = TOLERANCE
 ) -> dict[str, float]:
-    """How well a map's cells and a surface's points agree.
+    """Return precision, recall and F1 of the cells of a map against the points of a surface.
 
     Args:
         off_surface: distances of cells from the surface, m.
         off_map: distances of the surface's points from the nearest cell, m.
-        near: m, within which they do.
+        near: maximum distance of a match, m.
 
     Returns:
-        ``precision`` and ``recall``, the shares of cells and points that do, and ``f1``, their harmonic mean.
+        ``precision`` and ``recall``: shares of cells and points within `near`; ``f1``: their harmonic mean.
     """
     precision = over(off_surface <= near)
     recall = float(np.mean(off_map <= near))
@@ -115,13 +115,13 @@ def free_space_iou(
     azimuths: Float[np.ndarray, "beam"],
     ranges: Float[np.ndarray, "scan beam"],
 ) -> float:
-    """Overlap of the map's free space with what true beams passed through: intersection over union of the areas.
+    """Return the intersection over union of the map's free space with the area that true beams passed.
 
     Args:
-        grid: map in the estimate's frame.
-        turn, shift: alignment of the trajectory, from the estimate's to the reference's frame.
-        positions, yaw, azimuths, ranges: true scans in the reference's frame, m and rad; beams that met nothing count
-            as far as the longest that did.
+        grid: map in the frame of the estimate.
+        turn, shift: alignment of the trajectory, from the frame of the estimate to that of the reference.
+        positions, yaw, azimuths, ranges: true scans in the frame of the reference, m and rad; beams without a return
+            have the length of the longest one with a return.
     """
     met = np.isfinite(ranges) & (ranges > 0)
     if not met.any():

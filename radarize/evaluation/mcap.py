@@ -1,4 +1,4 @@
-"""A recording, a run, or both as an MCAP file, which Foxglove opens; topics and frames as in `foxglove`."""
+"""Export of a recording, a run, or both to an MCAP file for Foxglove; topics and frames as in `foxglove`."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 
 from radarize.evaluation.foxglove import Messages
 from radarize.evaluation.shownmaps import ShownMaps
-from radarize.evaluation.viewer import CAUSES, opened
+from radarize.evaluation.viewer import PATH_TYPE_COLORS, opened
 from radarize.io.pose import NOWHERE, OPTICAL_TURN, frame_between
 from radarize.io.recording import Recording
 from radarize.io.replacing import replacing
@@ -18,8 +18,9 @@ from radarize.signal.points import COLUMNS
 
 _BATCH = 16
 CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
-#: Colours of path types by label, red, green, blue; noise (255) and what has no colour are black.
-_CAUSES = np.array([[int(color[k : k + 2], 16) for k in (1, 3, 5)] for color in CAUSES] + [[0, 0, 0]], np.uint8)
+#: Colours of path types by label, red, green, blue; noise (255) and unknown labels are black.
+_COLORS = [tuple(bytes.fromhex(color[1:])) for color in PATH_TYPE_COLORS]
+_PALETTE = np.array([*_COLORS, (0, 0, 0)], np.uint8)
 
 
 def write_mcap(
@@ -28,11 +29,11 @@ def write_mcap(
     output: Path,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write a file.
+    """Write an MCAP file.
 
     Args:
-        source: a recording (``.h5``), of which heat maps are written and, where it has them, true poses, depth
-            pictures, points and path types; or a run's folder.
+        source: a recording (``.h5``), of which heat maps are written and, if it has them, true poses, depth pictures,
+            points and path types; or the folder of a run.
         run: run of the recording: poses, path, map and scans.
         output: file to write (``.mcap``).
         progress: called with (frames done, frames in all).
@@ -69,8 +70,8 @@ def _write_run(shown: Messages, run: RunFolder) -> None:
 
 
 def _write_truth(shown: Messages, recording: Recording, run: RunFolder | None) -> None:
-    """True poses and path. The world is fixed in odometry's frame where both begin, else moves about the radar, which
-    is where the truth is: as in ROS 2 bags (`radarize.io.exporters.ros2`)."""
+    """Write true poses and path. With odometry, the frame `world` is fixed in `odom` by the first pose; without it,
+    `world` moves relative to the radar, as in ROS 2 bags (`radarize.io.exporters.ros2`)."""
     truth = recording.true_poses()
     start = float(recording.times[0] + recording.config.burst_center)
     if recording.has("truth/depth_mount"):
@@ -105,10 +106,10 @@ def _write_frames(shown: Messages, recording: Recording, progress: Callable[[int
 
 
 def _write_sensors(shown: Messages, recording: Recording, frame: int, time: float) -> None:
-    """Path types, depth picture and points of a frame, as far as the recording has them."""
+    """Write path types, depth picture and points of a frame, if the recording has them."""
     if recording.has("truth/cause"):
         cause = recording.rows("truth/cause", frame, frame + 1)[0, ::-1, ::-1]
-        shown.picture(time, "cause", _CAUSES[np.minimum(cause, len(_CAUSES) - 1)])
+        shown.picture(time, "cause", _PALETTE[np.minimum(cause, len(_PALETTE) - 1)])
     if recording.has("truth/depth"):
         known = recording.has("truth/depth_intrinsics")
         lens = recording.read("truth/depth_intrinsics") if known else None

@@ -1,7 +1,7 @@
-"""Trajectory errors: absolute after alignment, and relative over a frame, a second and a metre.
+"""Trajectory errors: absolute after alignment (ATE), and relative over a frame, a second and a metre (RE).
 
-As in the paper (section 6): association within 10 ms, alignment without scale, means per trajectory. Unlike its
-published tables, relative rotation is a true relative error. Transformations and error matrices are evo's.
+As in the paper (section 6): association within 10 ms, alignment without scale, means per trajectory. Relative rotation
+is a relative error, in contrast to the paper's tables. Transformations and error matrices are computed by evo.
 """
 
 from collections.abc import Callable
@@ -16,18 +16,18 @@ from scipy.spatial.transform import Rotation
 
 from radarize.io.alignment import Association, alignment, matched, moved, planar
 
-#: Relative errors are taken between poses this far apart; a pair counts if it is within this share of it.
+#: Spans of relative errors, s and m; maximum relative deviation of the span of a pair of poses.
 SECOND, METRE, TOLERANCE = 1.0, 1.0, 0.1
 
 
 def over(values: np.ndarray, statistic: Callable[[np.ndarray], float] = np.mean) -> float:
-    """A statistic of values; NaN where there are none."""
+    """Return a statistic of values; NaN without values."""
     return float(statistic(values)) if np.size(values) else np.nan
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Mean, root mean square and maximum of a number of errors; NaN where there are none."""
+    """Mean, root mean square and maximum of errors, and their number; NaN without errors."""
 
     mean: float
     rmse: float
@@ -36,26 +36,26 @@ class Statistics:
 
     @classmethod
     def of(cls, errors: np.ndarray) -> "Statistics":
-        """Statistics of finite errors."""
+        """Compute statistics of finite errors."""
         rmse = float(np.sqrt(over(np.square(errors))))
         return cls(over(errors), rmse, over(errors, np.max), len(errors))
 
 
 @dataclass(frozen=True)
 class TrajectoryErrors:
-    """How far an estimated trajectory is from its reference.
+    """Errors of an estimated trajectory against its reference.
 
     Attributes:
         position, rotation: absolute errors after alignment, m and rad (ATE).
         relative: ``position`` and ``rotation`` by ``frame``, ``second`` and ``metre``, m and rad (RE).
-        distance: length of the reference, m; in the plane, so that a walker's bobbing does not count.
-        duration: s.
+        distance: length of the reference in the plane, without the vertical motion of walking, m.
+        duration: duration of the reference, s.
         share: mean absolute position error as a share of the distance.
-        drift: distance of the last poses when the first ones are laid upon each other, as a share of the distance.
-        time: (pose,) stamps of the matched poses, s.
-        position_errors, rotation_errors: (pose,) absolute errors, m and rad.
+        drift: position error of the last pose if the first poses are aligned, as a share of the distance.
+        time: time stamps of the matched poses, s.
+        position_errors, rotation_errors: absolute errors of each pose, m and rad.
         estimate, reference: matched trajectories, the estimate aligned.
-        turn, shift: the alignment: a point p of the estimate's frame lies at turn p + shift in the reference's.
+        turn, shift: the alignment: a point p in the frame of the estimate is turn p + shift in that of the reference.
     """
 
     position: Statistics
@@ -74,7 +74,7 @@ class TrajectoryErrors:
     shift: Float[np.ndarray, "3"] = field(repr=False)
 
     def summary(self) -> dict[str, object]:
-        """Figures for metrics.json; None where there is nothing to average."""
+        """Return the content of metrics.json; None for values that do not exist."""
         figures = {
             "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
             "re": {span: {what: asdict(each) for what, each in both.items()} for span, both in self.relative.items()},
@@ -95,13 +95,13 @@ def evaluate_trajectory(
     association: Association = "interpolate",
     names: tuple[str, str] = ("estimate", "reference"),
 ) -> TrajectoryErrors:
-    """Errors of an estimate against a reference.
+    """Compute the errors of an estimated trajectory against a reference.
 
     Args:
-        estimate, reference: see `radarize.io.alignment.load`.
-        in_plane: compare x, y and yaw only, for an estimate that knows no more; else all six degrees of freedom.
+        estimate, reference: trajectories, see `radarize.io.alignment.load`.
+        in_plane: compare x, y and yaw only, for planar estimates; else all six degrees of freedom.
         association: see `radarize.io.alignment.matched`.
-        names: what errors call the two.
+        names: names of both trajectories in error messages.
 
     Raises:
         InputError: fewer than three matching poses, or poses that are not finite.
@@ -142,7 +142,7 @@ def _absolute_errors(estimate: PoseTrajectory3D, reference: PoseTrajectory3D, re
 
 
 def _pairs(reference: PoseTrajectory3D) -> dict[str, np.ndarray]:
-    """Index pairs (first, second) of poses one frame, one second and one metre of the reference apart."""
+    """Return index pairs (first, second) of poses one frame, one second and one metre of the reference apart."""
     frames = np.arange(reference.num_poses)
     return {
         "frame": np.column_stack([frames[:-1], frames[1:]]),
@@ -152,7 +152,7 @@ def _pairs(reference: PoseTrajectory3D) -> dict[str, np.ndarray]:
 
 
 def _apart(values: np.ndarray, delta: float) -> np.ndarray:
-    """For every pose the one whose value is nearest to `delta` more, if it is near enough."""
+    """Return index pairs of poses whose values differ by `delta` within the tolerance."""
     wanted = values + delta
     after = np.clip(np.searchsorted(values, wanted), 1, len(values) - 1)
     nearest = np.where(wanted - values[after - 1] < values[after] - wanted, after - 1, after)
@@ -178,7 +178,7 @@ def without_nan(content: object) -> object: ...
 
 
 def without_nan(content: object) -> object:
-    """Plain data with None for numbers that are not finite, which JSON has no word for."""
+    """Convert to plain data, with None for numbers that are not finite, which JSON cannot represent."""
     if isinstance(content, dict):
         return {key: without_nan(value) for key, value in content.items()}
     if isinstance(content, list | tuple):

@@ -1,15 +1,15 @@
-"""Velocities and turns against the truth, step by step, before they are integrated; and whether their claimed
-uncertainties are honest.
+"""Errors of velocities and changes of yaw, frame by frame, before they are integrated; and the consistency of their
+covariances.
 """
 
 import numpy as np
 from jaxtyping import Float
 
-from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import Statistics, over
+from radarize.evaluation.nees import nees
 from radarize.io.pose import wrap
 
-#: m/s: from this speed on, there is a direction of motion.
+#: Least speed at which the direction of motion is defined, m/s.
 MOVING = 0.1
 
 
@@ -18,18 +18,19 @@ def velocity_errors(
     true: Float[np.ndarray, "frame 2"],
     covariance: Float[np.ndarray, "frame 2 2"] | None = None,
 ) -> dict[str, float]:
-    """Estimated against true velocity in the sensor frame, forward and left.
+    """Return statistics of the errors of velocities in the sensor frame (forward, left).
 
     Args:
-        estimate, true: m/s; NaN where there is none.
-        covariance: of the estimate, m^2/s^2.
+        estimate, true: velocities, m/s; NaN where there is none.
+        covariance: estimated covariance of each velocity, m^2/s^2.
 
     Returns:
-        ``mean``, ``rmse``, ``max``, ``median``, ``p90``: of the difference's length, m/s. ``forward``, ``left``: root
-        mean squares, m/s. ``bias``: mean of the difference along the true motion while there is any, m/s; positive: too
-        fast. ``missing``: share of frames without an estimate. With covariances, ``nees``: mean of the squared error in
-        units of its covariance over its expectation, 2, and ``nees_median``: median over its expectation, 2 ln 2: both
-        are 1 if the covariance is right, and outliers move only the first. NaN where there is nothing to average.
+        ``mean``, ``rmse``, ``max``, ``median``, ``p90``: statistics of the norm of the error, m/s. ``forward``,
+        ``left``: RMS error of each component, m/s. ``bias``: mean error along the true direction of motion over frames
+        in which the sensor moves, m/s; positive: estimated too fast. ``missing``: share of frames without an estimate.
+        With covariances, ``nees``: mean NEES over its expectation, 2, and ``nees_median``: median NEES over its
+        expectation, 2 ln 2. Both are 1 if covariances are consistent; outliers change the mean only. NaN if there is
+        nothing to average.
     """
     known = np.isfinite(estimate).all(axis=1) & np.isfinite(true).all(axis=1)
     difference, motion = (estimate - true)[known], true[known]
@@ -50,7 +51,7 @@ def velocity_errors(
     }
     if covariance is not None and len(length):
         try:
-            squared = normalised(difference, covariance[known])
+            squared = nees(difference, covariance[known])
             result["nees"], result["nees_median"] = float(squared.mean()), float(np.median(squared) / np.log(2))
         except np.linalg.LinAlgError:
             result["nees"] = result["nees_median"] = np.nan
@@ -60,12 +61,12 @@ def velocity_errors(
 def turn_errors(
     steps: Float[np.ndarray, "frame"], true_yaw: Float[np.ndarray, "frame"], frames: int
 ) -> Float[np.ndarray, "window"]:
-    """Errors of the change of yaw over windows of a recording, one starting at every frame, rad.
+    """Return errors of the change of yaw over windows of a number of frames, one window per first frame, rad.
 
     Args:
-        steps: estimated turn since the frame before, rad; the first one's is not used.
-        true_yaw: rad, wrapped or not.
-        frames: steps of a window.
+        steps: estimated change of yaw since the previous frame, rad; that of the first frame is not used.
+        true_yaw: true yaw of each frame, rad, wrapped or not.
+        frames: length of a window, frames.
     """
     turned = np.concatenate([[0.0], np.cumsum(steps[1:])])
     return wrap((turned[frames:] - turned[:-frames]) - (true_yaw[frames:] - true_yaw[:-frames]))

@@ -1,4 +1,4 @@
-"""Pictures of whatever the functions here return."""
+"""Plots of the results of this package's functions."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -28,18 +28,18 @@ def plot(
     """Draw a map, a trajectory, points, a run or a recording.
 
     Args:
-        what: a heat map of one frame (range-azimuth maps are drawn from above, in dB below the strongest cell), range
-            profiles of one frame or many, a trajectory, a point cloud, a run, its map or its scans, or a recording (its
-            truth).
-        axes: to draw on; by default those of a new figure.
-        title: of the axes.
-        velocity: (2,) forward, left in m/s, for a Doppler-azimuth map: draws where a static world must appear.
+        what: a heat map of one frame (range-azimuth maps are drawn from above, in dB relative to the strongest cell),
+            range profiles of one or more frames, a trajectory, a point cloud, a run, its map or its scans, or a
+            recording (its true trajectory).
+        axes: axes to draw on; by default those of a new figure.
+        title: title of the axes.
+        velocity: (2,) velocity forward, left in m/s: adds the ridge of static surfaces to a Doppler-azimuth map.
 
     Returns:
         The axes.
 
     Raises:
-        InputError: something else, maps of several frames, or a recording without truth.
+        InputError: another type, maps of several frames, or a recording without truth.
 
     Example:
         >>> axes = rz.plot(rz.range_azimuth(rec[4]), title="frame 4")

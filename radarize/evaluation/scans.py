@@ -1,6 +1,6 @@
-"""Scans against the true planar scan, bearing by bearing, and what the wrong ones come from.
+"""Errors of scans against the true planar scan on each bearing, and path types of wrong returns.
 
-Where the truth has no surface in reach, whatever is measured is too short.
+On bearings without a true surface in range, any return is too short.
 """
 
 from collections.abc import Sequence
@@ -11,8 +11,8 @@ from jaxtyping import Float, Int, UInt8
 from radarize.evaluation.mapping import TOLERANCE
 from radarize.evaluation.metrics import over
 
-#: m: free space is carved through a surface if the bearing ends farther behind it than this, a map's cells and a
-#: wall's thickness.
+#: Distance of a return behind a surface above which mapping clears free space through it, m: size of the cells of a map
+#: plus thickness of a wall.
 THROUGH = 0.20
 
 
@@ -21,24 +21,24 @@ def true_ranges(
     true: Float[np.ndarray, "scan bearing"],
     true_azimuths: Float[np.ndarray, "bearing"],
 ) -> Float[np.ndarray, "scan beam"]:
-    """True ranges on the bearings nearest to the measured ones, m; inf where there is no surface in reach."""
+    """Return the true ranges on the bearings nearest to the measured ones, m; inf without a surface in range."""
     return true[:, np.abs(true_azimuths[None] - azimuths[:, None]).argmin(axis=1)]
 
 
 def scan_errors(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray, "scan beam"]) -> dict[str, float]:
-    """Measured against true scans on the same bearings.
+    """Compare measured with true scans on the same bearings.
 
     Args:
-        measured: ranges, m; not finite, or 0, where nothing was returned.
-        true: ranges, m; inf where there is no surface in reach.
+        measured: ranges, m; not finite, or 0, without a return.
+        true: ranges, m; inf without a surface in range.
 
     Returns:
-        ``within_10cm``: share of returned bearings within 10 cm of the true range there. ``beside``: within 10 cm of
-        it there or one bearing to either side, where a wall at a glancing angle lies 25 cm nearer or farther.
-        ``returned``: share of bearings with something true in reach that return anything. ``median``: of the absolute
-        errors, m. ``beyond``, ``short``: shares of returned bearings more than 10 cm too far and too near.
-        ``through``: share of bearings with something true in reach that carve free space through it: that end more
-        than 20 cm behind it and behind what is one bearing to either side. NaN where there is nothing to count.
+        ``within_10cm``: share of returns within 10 cm of the true range. ``beside``: share of returns within 10 cm of
+        the true range on the same bearing or one beside it, where a wall at a glancing angle is 25 cm nearer or
+        farther. ``returned``: share of bearings with a surface in range that have a return. ``median``: median
+        absolute error, m. ``beyond``, ``short``: shares of returns that are more than 10 cm too long and too short.
+        ``through``: share of bearings with a surface in range whose return is more than 20 cm behind the surface on
+        this bearing and those beside it, so that mapping clears free space through it. NaN without bearings.
     """
     hit, reach = _returned(measured), np.isfinite(true)
     length = np.where(hit, measured, 0.0)
@@ -55,35 +55,37 @@ def scan_errors(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray
     }
 
 
-def wrong_by_cause(
+def wrong_by_path_type(
     measured: Float[np.ndarray, "scan beam"],
     true: Float[np.ndarray, "scan beam"],
     azimuths: Float[np.ndarray, "beam"],
-    cause: UInt8[np.ndarray, "scan range bearing"],
-    cause_ranges: Float[np.ndarray, "range"],
-    cause_azimuths: Float[np.ndarray, "bearing"],
+    types: UInt8[np.ndarray, "scan range bearing"],
+    type_ranges: Float[np.ndarray, "range"],
+    type_azimuths: Float[np.ndarray, "bearing"],
     names: Sequence[str],
 ) -> dict[str, float]:
-    """What returns that are more than 10 cm off the true range come from, by the strongest cause of their cell.
+    """Return the shares of wrong returns, with an error over 10 cm, by the path type of the strongest echo of their
+    cell.
 
-    A return at the right range is right whatever lies in its cell: a ghost upon a wall draws the wall.
+    A return at the correct range counts as correct, even if a ghost is the strongest echo of its cell.
 
     Args:
-        measured, true, azimuths: as for `scan_errors`, rad.
-        cause: provenance as `radarsim simulate --sensors ghosts` records it: index into `names` of the strongest cause
-            of every cell, others for noise.
-        cause_ranges, cause_azimuths: its axes, m and rad.
-        names: of the causes.
+        measured, true: ranges as in `scan_errors`, m.
+        azimuths: bearings of the measured ranges, rad.
+        types: path types as recorded by `radarsim simulate --sensors ghosts`: index into `names` of the strongest echo
+            of every cell; other values for noise.
+        type_ranges, type_azimuths: axes of `types`, m and rad.
+        names: names of the path types.
 
     Returns:
-        Share of all returned bearings by name, and ``noise``; they add up to the wrong ones. NaN without returns.
+        Share of all returns by name, and ``noise``; they sum to the share of wrong returns. NaN without returns.
     """
     hit, reach = _returned(measured), np.isfinite(true)
     wrong = hit & ~(reach & (np.abs(np.where(hit, measured, 0.0) - np.where(reach, true, 0.0)) <= TOLERANCE))
     scan, beam = np.nonzero(wrong)
-    row = _nearest(cause_ranges, measured[scan, beam])
-    column = _nearest(cause_azimuths, azimuths)[beam]
-    found = cause[scan, row, column]
+    row = _nearest(type_ranges, measured[scan, beam])
+    column = _nearest(type_azimuths, azimuths)[beam]
+    found = types[scan, row, column]
     counts = np.bincount(np.minimum(found, len(names)), minlength=len(names) + 1)
     returned = float(hit.sum()) or np.nan
     return {name: float(count / returned) for name, count in zip([*names, "noise"], counts, strict=True)}
@@ -94,12 +96,12 @@ def _returned(measured: np.ndarray) -> np.ndarray:
 
 
 def _beside(length: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest true range here and one bearing to either side, and the least distance to any of the three."""
+    """Return the largest true range on a bearing and those beside it, and the least distance to any of the three."""
     padded = np.pad(true, ((0, 0), (1, 1)), mode="edge")
     three = np.stack([padded[:, :-2], true, padded[:, 2:]])
     return three.max(axis=0), np.abs(three - length).min(axis=0)
 
 
 def _nearest(axis: np.ndarray, values: np.ndarray) -> Int[np.ndarray, "value"]:
-    """Indices of the axis' entries nearest to values; the axis ascends evenly."""
+    """Return indices of the nearest entries of a uniform ascending axis."""
     return np.clip(np.rint((values - axis[0]) / (axis[1] - axis[0])).astype(int), 0, len(axis) - 1)

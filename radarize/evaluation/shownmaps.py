@@ -1,4 +1,4 @@
-"""Heat maps of a recording as pictures for eyes."""
+"""Heat maps of a recording as colour images."""
 
 import numpy as np
 from jaxtyping import Float, Shaped, UInt8
@@ -9,19 +9,19 @@ from radarize.radar.array import azimuth_row
 from radarize.signal import polar
 from radarize.signal.maps import MapMaker, maps_of
 
-#: Maps that are shown; of pictures the first alone, and none where a single antenna tells no azimuth.
+#: Maps that are shown; only the first for recordings of pictures, and none for a single virtual antenna.
 MAPS = ("range_azimuth", "doppler_azimuth")
 
 
 class ShownMaps:
-    """Range-azimuth and Doppler-azimuth maps, or what the recording holds in their place."""
+    """Range-azimuth and Doppler-azimuth maps of a recording, or its pictures, as colour images."""
 
     def __init__(self, recording: Recording):
         self.recording, self._pictured = recording, polar.pictured(recording)
         self._maker = None if self._pictured or len(azimuth_row(recording.config)) < 2 else MapMaker(recording.config)
 
     def of(self, first: int, last: int) -> dict[str, UInt8[np.ndarray, "frame row azimuth 3"]]:
-        """Of frames first...last-1, by name.
+        """Return images of frames first...last-1, by name of the map.
 
         Raises:
             InputError: see `maps_of`.
@@ -42,7 +42,7 @@ class ShownMaps:
 def colored(
     levels: Float[np.ndarray, "frame row azimuth"], near: Shaped[np.ndarray, "row"]
 ) -> UInt8[np.ndarray, "frame row azimuth 3"]:
-    """Maps in dB as colours, from a map's median to its strongest cell of those not `near`; far is up, left is left."""
+    """Convert maps in dB to colours, from the median to the maximum of rows not `near`; far is up, left is left."""
     from matplotlib import colormaps
 
     top = levels[:, ~near].max(axis=(1, 2), keepdims=True)

@@ -1,13 +1,13 @@
-"""A recording, a run, or both in the Rerun viewer, on one time line: seconds since the first frame.
+"""A recording, a run, or both in the Rerun viewer, on a time line in seconds since the first frame.
 
     /world                  z up; /floor_plan
     /world/truth            path; radar (pose), below it scan, points (TI's), camera/depth
-    /world/slam             path, map; radar, below it scan: all laid upon the truth, where there is one
+    /world/slam             path, map; radar, below it scan: all aligned with the truth, if there is one
     /world/odometry         path; radar
-    /radar                  range_azimuth and doppler_azimuth (left is left, far is up), cause (of every cell)
+    /radar                  range_azimuth and doppler_azimuth (left is left, far is up), cause (path type of every cell)
     /velocity               forward and left, of truth and run
 
-Everything is sent column-wise, in batches of frames.
+Data is sent column-wise, in batches of frames.
 """
 
 import os
@@ -36,8 +36,8 @@ if TYPE_CHECKING:  # an extra
     import rerun.blueprint
 
 _BATCH = 16
-#: Colours of causes in the order of their labels: direct, floor or ceiling, then what is no wall.
-CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
+#: Colours of path types in the order of their labels: direct, floor or ceiling, then the others.
+PATH_TYPE_COLORS = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
 
 
 def view(
@@ -49,7 +49,7 @@ def view(
     """Show a recording or a run.
 
     Args:
-        source: a recording (``.h5``), or a run's folder.
+        source: a recording (``.h5``), or the folder of a run.
         run: run of the recording, to show with it.
         save: file to write (``.rrd``) instead of opening a window.
         progress: called with (frames done, frames in all).
@@ -79,7 +79,7 @@ def view(
 
 
 def _open_window(stream: "rerun.RecordingStream") -> None:
-    """Start the viewer, which is looked for where this Python's programs are, too."""
+    """Start the viewer, searching the programs of this Python environment as well."""
     if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
         raise InputError("a window needs a screen, but DISPLAY and WAYLAND_DISPLAY are not set; --save writes a file")
     os.environ["PATH"] = os.pathsep.join([os.environ.get("PATH", os.defpath), sysconfig.get_path("scripts")])
@@ -88,7 +88,7 @@ def _open_window(stream: "rerun.RecordingStream") -> None:
 
 @contextmanager
 def opened(source: Path, run: Path | None) -> Iterator[tuple[Recording | None, RunFolder | None]]:
-    """A recording and its run, or one of the two.
+    """Open a recording and its run, or one of them.
 
     Raises:
         InputError: two runs, a recording without a frame, or see `Recording` and `RunFolder`.
@@ -106,7 +106,7 @@ def opened(source: Path, run: Path | None) -> Iterator[tuple[Recording | None, R
 
 
 def _layout() -> "rerun.blueprint.Blueprint":
-    """What is where in the window."""
+    """Return the layout of the window."""
     import rerun.blueprint as rrb
 
     pictures = [rrb.Spatial2DView(origin=f"radar/{name}", name=name.replace("_", "-")) for name in (*MAPS, "cause")]
@@ -125,10 +125,10 @@ def _layout() -> "rerun.blueprint.Blueprint":
 
 
 class Screen:
-    """Sends to a Rerun stream, column-wise.
+    """Sender to a Rerun stream, column-wise.
 
     Attributes:
-        start: stamp of the time line's zero, s.
+        start: time stamp of the zero of the time line, s.
     """
 
     def __init__(self, stream: "rerun.RecordingStream"):
@@ -138,33 +138,33 @@ class Screen:
         self._styled: set[str] = set()
 
     def fixed(self, path: str, *things: "rerun.AsComponents") -> None:
-        """Something that does not change."""
+        """Send static data."""
         self._stream.log(path, *things, static=True)
 
     def style(self, path: str, thing: "rerun.AsComponents") -> None:
-        """What all rows of a path share; told with the first of them."""
+        """Send properties that all rows of a path share, once."""
         if path not in self._styled:
             self._styled.add(path)
             self.fixed(path, thing)
 
     def over_time(self, path: str, times: Float[np.ndarray, "row"], columns: "rerun.ComponentColumnList") -> None:
-        """Something at instants (stamps, s)."""
+        """Send data with time stamps (s)."""
         clock = self.rr.TimeColumn("time", duration=np.asarray(times) - self.start)
         self._stream.send_columns(path, indexes=[clock], columns=columns)
 
     def line(self, path: str, points: Float[np.ndarray, "point 3"], color: str) -> None:
-        """A path through the world."""
+        """Send a line through points (m)."""
         self.fixed(path, self.rr.LineStrips3D([points], colors=_rgb(color), radii=0.015))
 
     def poses(self, path: str, times: Float[np.ndarray, "row"], poses: Float[np.ndarray, "row 7"]) -> None:
-        """What moves, with axes half a metre long."""
+        """Send a moving frame, with axes half a metre long."""
         self.over_time(path, times, self.rr.Transform3D.columns(translation=poses[:, :3], quaternion=poses[:, 3:]))
         self.fixed(path, self.rr.TransformAxes3D(axis_length=0.5))
 
     def points(
         self, path: str, times: Float[np.ndarray, "row"], clouds: list[Float[np.ndarray, "point 3"]], color: str
     ) -> None:
-        """A cloud of points for every instant, in the frame that the path is in."""
+        """Send a point cloud for every time, in the frame of the path's parent."""
         columns = self.rr.Points3D.columns(positions=np.concatenate(clouds))
         self.over_time(path, times, columns.partition([len(cloud) for cloud in clouds]))
         self.style(path, self.rr.Points3D.from_fields(radii=0.03, colors=_rgb(color)))
@@ -177,7 +177,7 @@ class Screen:
         ranges: Float[np.ndarray, "row beam"],
         color: str,
     ) -> None:
-        """Ends of the beams that met something."""
+        """Send the end points of beams with a return."""
         clouds = []
         for row in ranges:
             hit = np.isfinite(row) & (row > 0)
@@ -193,7 +193,7 @@ class Screen:
         kind: Any,
         **more: Any,
     ) -> None:
-        """Images of one format: `kind` is Image (RGB), SegmentationImage or DepthImage; `more` are fields of all."""
+        """Send images of one format: `kind` is Image (RGB), SegmentationImage or DepthImage; `more` are its fields."""
         shape, rr = images.shape[1:], self.rr
         model = {"color_model": "RGB"} if len(shape) == 3 else {"color_model": "L"}
         form = rr.components.ImageFormat(
@@ -203,14 +203,14 @@ class Screen:
         self.over_time(path, times, kind.columns(buffer=[image.tobytes() for image in images]))
 
     def speeds(self, times: Float[np.ndarray, "row"], velocity: Float[np.ndarray, "row 2"], who: str) -> None:
-        """Velocity forward and left, m/s."""
+        """Send velocities forward and left, m/s."""
         for axis, column in zip(("forward", "left"), velocity.T, strict=True):
             known = np.isfinite(column)
             self.over_time(f"velocity/{axis}/{who}", times[known], self.rr.Scalars.columns(scalars=column[known]))
 
 
 def show_recording(screen: Screen, recording: Recording, progress: Callable[[int, int], None]) -> None:
-    """What a recording holds: heat maps of its frames, and whatever truth and sensors it has."""
+    """Send the heat maps of a recording, and its truth and other sensors."""
     rr, config = screen.rr, recording.config
     screen.fixed("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     if recording.has("truth/floor_plan"):
@@ -225,7 +225,7 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
         screen.speeds(recording.times + config.burst_center, speeds, "truth")
     if recording.has("truth/cause"):
         names = recording.labels("truth/cause")
-        labels = [(k, name, _rgb(CAUSES[k % len(CAUSES)])) for k, name in enumerate(names)]
+        labels = [(k, name, _rgb(PATH_TYPE_COLORS[k % len(PATH_TYPE_COLORS)])) for k, name in enumerate(names)]
         screen.fixed("radar/cause", rr.AnnotationContext([*labels, (255, "noise", (0, 0, 0))]))
     if recording.has("truth/depth_mount") and recording.has("truth/depth_intrinsics"):
         _send_camera(screen, recording)
@@ -237,7 +237,7 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
 
 
 def _send_camera(screen: Screen, recording: Recording) -> None:
-    """Where the depth camera is on the radar, and its lens."""
+    """Send the mounting of the depth camera and its intrinsics."""
     rr, mount = screen.rr, recording.read("truth/depth_mount")
     fx, fy, cx, cy = map(float, recording.read("truth/depth_intrinsics"))
     shape = recording.describe("truth/depth")["shape"]
@@ -249,13 +249,13 @@ def _send_camera(screen: Screen, recording: Recording) -> None:
         focal_length=[fx, fy], principal_point=[cx, cy], resolution=[width, height],
         camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.3,
     )  # fmt: skip
-    # The lens' axes are right, down, forward.
+    # The axes of the camera are right, down, forward.
     turn = rr.Transform3D(quaternion=rr.Quaternion(xyzw=[-0.5, 0.5, -0.5, 0.5]))
     screen.fixed("world/truth/radar/camera/depth", turn, lens)
 
 
 def _send_frames(screen: Screen, recording: Recording, first: int, last: int, maps: ShownMaps) -> None:
-    """Frames first...last-1; a recording's streams belong to the middles of the bursts."""
+    """Send frames first...last-1; the time of all streams is the middle of the burst."""
     rr, times = screen.rr, recording.times[first:last] + recording.config.burst_center
     for name, pixels in maps.of(first, last).items():
         screen.pictures(f"radar/{name}", times, pixels, rr.Image)
@@ -274,13 +274,13 @@ def _send_frames(screen: Screen, recording: Recording, first: int, last: int, ma
 
 
 def _rgb(color: str) -> tuple[int, int, int]:
-    """From #rrggbb."""
+    """Convert #rrggbb to red, green, blue."""
     red, green, blue = bytes.fromhex(color[1:])
     return red, green, blue
 
 
 def show_run(screen: Screen, run: RunFolder) -> None:
-    """What a run holds: trajectories, laid upon the truth where it is known, map and scans."""
+    """Send the trajectories of a run, aligned with the truth if there is one, its map and its scans."""
     rr = screen.rr
     scans, paths = run.scans, trajectories(run)
     reference = None if run.reference is None else trajectory(*run.reference)
@@ -289,7 +289,7 @@ def show_run(screen: Screen, run: RunFolder) -> None:
     for name, path in paths.items():
         if reference is not None:
             turn, shift = fitted(path, reference)
-            # SLAM's plane is the radar's: at the height that it was carried at.
+            # The plane of SLAM is at the mean height of the radar.
             shift = shift + [0, 0, reference.positions_xyz[:, 2].mean()]
             screen.fixed(f"world/{name}", rr.Transform3D(translation=shift, mat3x3=turn))
         poses = np.hstack([path.positions_xyz, np.roll(path.orientations_quat_wxyz, -1, axis=1)])
@@ -304,7 +304,7 @@ def show_run(screen: Screen, run: RunFolder) -> None:
 
 
 def _send_map(screen: Screen, found: OccupancyMap) -> None:
-    """The map as a picture on the floor of SLAM's frame."""
+    """Send the map as an image on the ground of SLAM's frame."""
     rr, (height, width) = screen.rr, found.pixels.shape
     x, y, yaw = found.origin
     form = rr.components.ImageFormat(width=width, height=height, color_model="L", channel_datatype="U8")

@@ -80,7 +80,8 @@ def test_a_real_walk(recordings, tmp_path):
 
 
 def test_pictures_of_one_number_that_are_not_of_one_instant(tmp_path):
-    """A warning says so; aligned, truth is of the same instants, and frames that the lidar did not see are left out."""
+    """There is a warning; with --align, the truth is matched by time, and frames without a lidar picture are left
+    out."""
     walk = MadeUp(tmp_path / "clone", 7, 320, first=-30.0, rate=1.08)
     walk.write(walk.folder)
     times = 0.05 * np.arange(320)
@@ -91,7 +92,7 @@ def test_pictures_of_one_number_that_are_not_of_one_instant(tmp_path):
         assert len(recording) == 320 and recording.read("truth/time") == pytest.approx(times)
     aligned = import_recording(walk.folder, tmp_path / "7.h5", replace(given, align=True))
     with Recording(aligned) as recording:
-        assert "warnings" not in recording.attributes and "of the lidar's picture -" in recording.attributes["clock"]
+        assert "warnings" not in recording.attributes and "is the lidar's picture -" in recording.attributes["clock"]
         frames = np.rint(recording.read("radar/time") / 0.05).astype(int)
         assert np.abs(frames[[0, -1]] - [28, 319]).max() <= 1 and np.array_equal(
             np.diff(frames), np.ones(len(frames) - 1)
@@ -105,10 +106,10 @@ def test_pictures_of_one_number_that_are_not_of_one_instant(tmp_path):
         assert recording.read("truth/time")[100] == pytest.approx(0.05 * 130 / 1.08, abs=0.1)
 
 
-def test_clocks_that_pictures_do_not_tell(clone, tmp_path):
-    """Twenty frames are too few: a warning, and pictures of one number as without --align."""
+def test_clock_that_cannot_be_estimated(clone, tmp_path):
+    """Twenty frames are too few: there is a warning, and pictures are matched by frame index as without --align."""
     with Recording(import_recording(clone, tmp_path / "7.h5", Given(walk=7, align=True))) as recording:
-        assert "paired by number" in recording.attributes["warnings"] and "clock" not in recording.attributes
+        assert "matched by frame index" in recording.attributes["warnings"] and "clock" not in recording.attributes
         assert len(recording) == 20
 
 

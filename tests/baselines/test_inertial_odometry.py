@@ -1,4 +1,4 @@
-"""milliEgo and RNIN in a stream: with networks that tell the truth, the track is the truth."""
+"""milliEgo and RNIN in a stream: with networks that return the true displacement, the track is the true path."""
 
 import numpy as np
 import pytest
@@ -51,15 +51,15 @@ def follow(name: str, recording: Recording, weights: Weights, cuts: list[int]) -
 
 
 class Truth:
-    """What a perfect network would say of frames, one after another."""
+    """A network that returns the true displacement of consecutive frames."""
 
     def __init__(self, answers: np.ndarray, covariance: np.ndarray):
-        self.answers, self.covariance, self.told = answers, covariance, 0
+        self.answers, self.covariance, self.done = answers, covariance, 0
 
     def estimate(self, first: torch.Tensor, *_) -> tuple[torch.Tensor, torch.Tensor]:
-        told = self.answers[self.told : self.told + len(first)]
-        self.told += len(first)
-        return torch.from_numpy(told), torch.from_numpy(self.covariance).expand(len(told), -1, -1)
+        mean = self.answers[self.done : self.done + len(first)]
+        self.done += len(first)
+        return torch.from_numpy(mean), torch.from_numpy(self.covariance).expand(len(mean), -1, -1)
 
 
 def true_track() -> np.ndarray:
@@ -83,7 +83,7 @@ def test_truth_told_is_truth_followed(name, recording, weights, monkeypatch):
     header = Header(kind=name, frames=3, maps=(), width=4, grid=None)
     monkeypatch.setattr("radarize.baselines.inertial.load", lambda path, network: (net, header))
     track, truth = follow(name, recording, weights, [16] * 5 + [10]), true_track()
-    # The first displacement comes when there is a frame to tell it from: until then nothing is known but rest.
+    # The first displacement needs an earlier frame: until then the estimate is at rest.
     late = slice(45, None)
     assert track.step[late] == pytest.approx(between(truth[44:-1], truth[45:]), abs=0.012)
     apart = between(track.pose[45], track.pose[-1]) - between(truth[45], truth[-1])

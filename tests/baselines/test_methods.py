@@ -1,4 +1,4 @@
-"""The registry: every name makes something that works, what is made is made once, and what cannot work says why."""
+"""The registry of methods: every name makes a working method, results are cached, and errors state their reason."""
 
 from dataclasses import replace
 
@@ -122,7 +122,7 @@ def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
 
 
 def test_frames_come_as_often_as_networks_need_them():
-    """15 a second, or the next more that the radar gives; where the map alone tells turns, all."""
+    """15 Hz, or the next higher rate that the radar provides; all frames if yaw rates are from the map alone."""
     periods = {1: (1 / 15, 0.1, 1 / 20), 2: (33.333e-3, 1 / 30, 1 / 40), 4: (1 / 60,)}
     for every, many in periods.items():
         assert {pace("fused", CONFIG.model_copy(update={"frame_period": period})) for period in many} == {every}
@@ -141,9 +141,9 @@ def test_velocities_are_the_networks_too_where_the_array_tells_little(monkeypatc
     aop = CONFIG.model_copy(update={"board": "iwr6843aop", "start_frequency": 60e9})
     assert velocity(PRESETS["two-tx"]).always and velocity(aop).always
     assert isinstance(velocity(CONFIG.model_copy(update={"loops": CONFIG.loops // 3})), DopplerVelocity)
-    whole, told = velocity(CONFIG), np.zeros((4, 2))
+    whole, estimate = velocity(CONFIG), np.zeros((4, 2))
     spread = np.array([0.01, 0.02, 0.2, 0.04])[:, None, None] ** 2 * np.eye(2)
-    sure, asked = Velocities(told, spread, np.full(4, 9), np.ones(4, bool)), []
+    sure, asked = Velocities(estimate, spread, np.full(4, 9), np.ones(4, bool)), []
     monkeypatch.setattr(whole.doppler, "estimate", lambda batch: sure)
     monkeypatch.setattr(
         whole.learned, "estimate", lambda batch, which: asked.append(which) or replace(sure, seen=which)

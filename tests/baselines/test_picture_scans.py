@@ -95,7 +95,7 @@ def test_what_needs_samples_says_so(pictured, tmp_path):
 
 
 def test_pictures_without_anything(pictured, tmp_path):
-    """Nothing seen is a result, too, and it says so."""
+    """Without any return there is a result, with a warning."""
     run(pictured, tmp_path / "r")
     folder = RunFolder(tmp_path / "r")
     assert folder.unobservable_spans.share_of_way == 0 or folder.warnings

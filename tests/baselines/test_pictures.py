@@ -215,7 +215,7 @@ def test_it_learns_where_the_wall_is(one_thread):
 
 
 def test_recordings_of_the_simulator_are_read(tmp_path):
-    """Antennas are made of samples of one loop; labels come packed; the network says what it reads: pictures."""
+    """Antenna signals are computed from samples of one loop, labels are packed, and the header names pictures."""
     from radarize.io.recording import RecordingWriter, Stream
 
     with RecordingWriter(

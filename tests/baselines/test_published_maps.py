@@ -113,7 +113,7 @@ def test_batches_see_their_buffer_and_frames_can_be_picked(noisy):
 def test_silence_is_dark_and_other_arrays_are_refused():
     made = PublishedMaps(CONFIG)(np.zeros((1, *CONFIG.frame_shape), np.int16))
     assert all((values == 0).all() for values in made.values())
-    with pytest.raises(InputError, match="no 12 channels"):
+    with pytest.raises(InputError, match="expected 12 channels"):
         PublishedMaps(PRESETS["two-tx"])
 
 

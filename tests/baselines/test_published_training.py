@@ -114,8 +114,8 @@ def test_pooled_dice_knows_no_balance():
     assert pooled_dice(logits, label).item() == pytest.approx(1 - right.mean(), abs=1e-6)
 
 
-class Told(torch.nn.Module):
-    """A network that says what it is told, first forwards, then backwards."""
+class Fixed(torch.nn.Module):
+    """A network that returns given values, first forward, then in reversed time."""
 
     def __init__(self, answer):
         super().__init__()
@@ -128,11 +128,11 @@ class Told(torch.nn.Module):
 def test_losses():
     translation, rotation = TASKS["translation"], TASKS["rotation"]
     maps, label = torch.zeros(2, 1, 2, 4, 4), torch.tensor([[1.0, 0.0], [0.0, 2.0]])
-    said = torch.tensor([[1.0, 1.0], [2.0, 2.0]])
-    assert translation.loss(Told(said), maps, label).tolist() == pytest.approx([(5 / 4) ** 0.5] * 2)
+    estimate = torch.tensor([[1.0, 1.0], [2.0, 2.0]])
+    assert translation.loss(Fixed(estimate), maps, label).tolist() == pytest.approx([(5 / 4) ** 0.5] * 2)
     both = torch.tensor([[0.3], [0.1], [-0.1], [0.0]])
     expected = [(0.2 - 0.3) ** 2 + (-0.2 + 0.1) ** 2, (0.1 - 0.1) ** 2 + (-0.1 - 0.0) ** 2]
-    found = rotation.loss(Told(both), torch.zeros(2, 2, 3, 4, 4), torch.tensor([[0.2], [0.1]]))
+    found = rotation.loss(Fixed(both), torch.zeros(2, 2, 3, 4, 4), torch.tensor([[0.2], [0.1]]))
     assert found.tolist() == pytest.approx(expected)
 
 
@@ -208,9 +208,9 @@ def test_the_chain_is_four_interleaved_ones_and_euler_steps(data, tmp_path):
         odometry = PublishedOdometry(maps, nets["translation"], nets["rotation"], headings)
         scanner = PublishedScans(maps, nets["segmentation"])
         batches = list(stream(Preprocessor(signal), adc, times, size=size))
-        followed = [odometry.update(one) for one in batches]
-        poses = np.concatenate([track.pose for track in followed])
-        assert np.concatenate([track.time for track in followed]) == pytest.approx(times[4::2] + CONFIG.burst_center)
+        tracks = [odometry.update(one) for one in batches]
+        poses = np.concatenate([track.pose for track in tracks])
+        assert np.concatenate([track.time for track in tracks]) == pytest.approx(times[4::2] + CONFIG.burst_center)
         assert poses[:, :2] == pytest.approx(place, abs=1e-5)
         assert np.exp(1j * poses[:, 2]) == pytest.approx(np.exp(1j * np.array(yaw)), abs=1e-5)
         # Of the same batches, whose maps are made once.

@@ -89,7 +89,7 @@ def test_shipped_weights_for_maps_say_what_they_said():
 
 
 def test_loss_against_loops():
-    """0.9 cross-entropy and 0.1 Dice; where nobody has seen anything, the network may say what it likes."""
+    """0.9 cross-entropy + 0.1 Dice loss; the output in unknown columns has no effect."""
     noise = torch.Generator().manual_seed(0)
     logits, label = torch.randn((2, 8, 6), generator=noise), (torch.rand((2, 8, 6), generator=noise) < 0.3).float()
     label[1, :, 4:] = UNKNOWN
@@ -137,11 +137,11 @@ def test_it_is_trained_on_what_ours_is_trained_on(monkeypatch):
 
 
 def test_the_threshold_is_that_of_the_nearest_points():
-    """Of cells of which a third is certain, the others only likely: the lidar has points in those that are certain."""
+    """The fitted probability separates likely cells with points of the lidar from less likely ones without."""
     label = np.zeros((1, polar.ROWS, polar.BEAMS), bool)
     label[0, 80, 100:400] = True
 
-    class Says(torch.nn.Module):
+    class Constant(torch.nn.Module):
         def __init__(self):
             super().__init__()
             self.register_buffer("least", torch.tensor(0.5))
@@ -151,7 +151,7 @@ def test_the_threshold_is_that_of_the_nearest_points():
             found[0, 80, 100:400], found[0, 150, 100:400] = 0.33, 0.22
             return found
 
-    net, packed = Says(), torch.from_numpy(np.packbits(label, axis=2))
+    net, packed = Constant(), torch.from_numpy(np.packbits(label, axis=2))
     TASK.calibrate(net, [(heard([80.0], items=1, frames=2), packed)])
     assert 0.22 < float(net.least) < 0.33
     apart = chamfer(net.estimate(None) > 0.5, unpacked(packed, DRAWN))

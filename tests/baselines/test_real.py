@@ -1,4 +1,4 @@
-"""Real walks judged: a clone made up, whose lidar and radar see a wall."""
+"""The benchmark on real walks, on a synthetic clone whose lidar and radar see a wall."""
 
 import json
 import lzma
@@ -39,7 +39,7 @@ def clone(tmp_path):
 
 
 def predictions(folder, row: int):
-    """Of frames from the 40th on: the wall at a row, on the Cartesian grid."""
+    """Write predictions for frames from the 40th on: the wall at a range row, on the Cartesian grid."""
     cells = np.zeros((FRAMES - 40, *map(len, polar.GRID)), np.uint8)
     picture = np.zeros((256, 512), bool)
     picture[row, 160:352] = True
@@ -65,18 +65,18 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path, monkeypatch):
     shown = done.output.splitlines()[:-1]
     assert max(map(len, shown)) <= 80 and f" {found['picture']['mod_hausdorff_m']:.4g} " in done.output
     assert {"hausdorff", "chamfer", "smoothed"} <= {word for line in shown for word in line.split()}
-    # Who stands has not moved, and nothing turned; maps of the wall agree as its scans do.
+    # The rig stands still, so positions and headings stay; maps of the wall are as accurate as the scans.
     assert found["lidar"]["ate_m"] < 0.02 and found["shifted pictures"]["yaw_rmse_deg"] < 0.1
     assert found["lidar"]["map_f1"] > 0.9 and found["others"]["map_f1"] > 0.9 > found["first-echo"]["map_f1"]
     assert found["others"]["chamfer_m"] == 0 and found["others"]["frames"] == FRAMES - 40
-    # A wall that is read 5 rows too far is off by that, 0.21 m, but for its ends.
+    # A wall that is read 5 rows too far has a distance error of 0.21 m, except at its ends.
     assert found["picture"]["mod_hausdorff_m"] == pytest.approx(0.21, abs=0.04)
     assert found["picture"]["chamfer_m"] == pytest.approx(0.21, abs=0.06)
     assert "all real" in (tmp_path / "out" / "real.md").read_text()
 
 
 def test_networks_have_rows_where_their_weights_are(clone, tmp_path):
-    """One of RadarHD's kind that draws what the radar sees is as near as the picture itself."""
+    """A network that returns its input has the point-cloud distance of the picture itself."""
     weights(repeating(), tmp_path / "radarhd-pictures.safetensors")
     found = real(clone, tmp_path / "out", RealOptions(weights=tmp_path))
     rows, maps = ({row["method"]: row for row in found.tables[k].rows} for k in (0, 3))
@@ -88,8 +88,8 @@ def test_networks_have_rows_where_their_weights_are(clone, tmp_path):
     assert [network.kind for network in found.networks] == ["radarhd-pictures"]
 
 
-def test_what_is_of_one_instant_is_nearer(tmp_path):
-    """A radar that lost frames: by number, pictures are of places up to 0.75 m apart; by instant they agree."""
+def test_frames_matched_by_time_agree_better(tmp_path):
+    """A radar that lost frames: matched by frame index, pictures are of places up to 0.75 m apart."""
     walk = MadeUp(tmp_path / "clone", 7, 320, first=-30.0, rate=1.08)
     write_tum(tmp_path / "7.tum", 0.05 * np.arange(320), planar_poses(np.array([walk.pose(k) for k in range(320)])))
     found = real(walk.write(walk.folder), tmp_path / "out", RealOptions(weights=tmp_path, poses=tmp_path))
@@ -98,12 +98,13 @@ def test_what_is_of_one_instant_is_nearer(tmp_path):
     shifted = rows["shifted pictures, smoothed"]
     assert shifted["instant_yaw_rmse_deg"] < shifted["yaw_rmse_deg"]
     clock = found.tables[1].rows[0]
-    assert clock["start_s"] == pytest.approx(1.5, abs=0.1) and clock["alike by instant"] > 2 * clock["alike by number"]
+    assert clock["correlation, by time"] > 2 * clock["correlation, by frame index"]
+    assert clock["start_s"] == pytest.approx(1.5, abs=0.1)
     assert clock["end_s"] == pytest.approx(1.5 - 0.05 * 0.08 * 319, abs=0.1)
 
 
-def test_turns_of_the_same_instants():
-    """Who tells the turns of the radar's instants exactly is right by instant, and wrong by number."""
+def test_errors_of_yaw_changes_matched_by_time_and_by_frame_index():
+    """Exact changes of yaw at the times of the radar's frames have errors only if matched by frame index."""
     walk = MadeUp(Path(), 7, 320, first=-30.0, rate=1.08)
     poses = np.array([walk.pose(frame) for frame in range(320)])
     yaw = np.array([walk.pose(-30.0 + 1.08 * frame)[2] for frame in range(320)])
@@ -116,26 +117,26 @@ def test_turns_of_the_same_instants():
     (["--walks", "8"], "has no walk 8"), (["--walks", "x"], "expected numbers"),
     (["--predictions", "others"], "expected NAME=FOLDER"),
 ])  # fmt: skip
-def test_what_is_not_there(clone, tmp_path, options, words):
+def test_invalid_options(clone, tmp_path, options, words):
     done = CliRunner().invoke(app, ["benchmark", "real", "--data", str(clone), "--out", str(tmp_path / "o"), *options])
     assert isinstance(done.exception, InputError) and words in str(done.exception)
 
 
-def test_frames_that_are_alike_count_less():
-    """Errors of an autoregressive process: the spread of medians over many of them is what one of them says."""
+def test_standard_error_of_the_median_of_correlated_errors():
+    """Errors of an autoregressive process: the estimate agrees with the spread of the medians of many realisations."""
     rng = np.random.default_rng(0)
-    told, medians = [], []
+    estimates, medians = [], []
     for _ in range(200):
         values = np.zeros(600)
         for k, noise in enumerate(rng.normal(size=600)):
             values[k] = 0.9 * values[k - 1] + noise
-        told.append(median_error(values))
+        estimates.append(median_error(values))
         medians.append(np.median(values))
-    assert np.median(told) == pytest.approx(np.std(medians), rel=0.25)
+    assert np.median(estimates) == pytest.approx(np.std(medians), rel=0.25)
 
 
 def test_turns_to_the_left_are_positive():
-    """What lies at a greater azimuth before lies at a lesser one after a turn to the left."""
+    """Azimuths of the static world decrease as the radar turns to the left."""
     rng = np.random.default_rng(0)
     wide = (255 * (rng.random((256, 64 + 60)) > 0.95)).astype(np.uint8)
     pictures = np.stack([wide[:, frame // 4 : frame // 4 + 64] for frame in range(40)])  # a column every 0.2 s
@@ -147,8 +148,8 @@ def test_turns_to_the_left_are_positive():
     assert errors["turns_rms_deg"] == pytest.approx(np.degrees(step)) and errors["yaw_median_deg"] < 0.05
 
 
-def test_smoothed_turns_lose_noise_and_keep_turns():
-    """Of white noise a Gaussian leaves 1 / (2 sqrt(pi) sigma) of the variance; steady turns stay, unknown ones are."""
+def test_smoothing_reduces_noise_and_keeps_a_steady_turn():
+    """A Gaussian reduces the variance of white noise by 1 / (2 sqrt(pi) sigma); unknown changes of yaw stay unknown."""
     rng = np.random.default_rng(0)
     noise = rng.normal(size=20000)
     left = np.var(smoothed(noise)) * 2 * np.sqrt(np.pi) * SMOOTH
@@ -165,21 +166,21 @@ def test_scans_have_the_nearest_point_of_each_bearing():
     assert found[90] == 1.0 and found[135] == pytest.approx(np.sqrt(2)) and np.isinf(found).sum() == len(BEARINGS) - 2
 
 
-def test_odometry_drifts_as_its_errors_say():
-    """Variance of the end's yaw over many seeds: that of the steps, added up, and of the bias."""
+def test_simulated_odometry_drifts_by_its_noise_and_bias():
+    """Standard deviation of the last yaw over many seeds: from the noise of all steps and the bias."""
     poses = np.zeros((201, 3))
     ends = [disturbed(poses, seed)[0][-1, 2] for seed in range(100)]
     expected = np.hypot(np.sqrt(200) * np.radians(0.1), 200 * 0.05 * np.radians(0.3))
     assert np.std(ends) == pytest.approx(expected, rel=0.25)
 
 
-def test_odometry_claims_what_it_is_off_by_over_a_second():
-    """Along a line, over many seeds: squared errors over claims are 1, along the way, across it and in heading."""
+def test_covariance_of_the_simulated_odometry_is_consistent_over_a_second():
+    """Along a line, over many seeds: mean squared error over variance is 1 along the path, across it and in heading."""
     poses = np.column_stack([0.05 * np.arange(21), np.zeros(21), np.zeros(21)])
     found = [disturbed(poses, seed) for seed in range(400)]
     steps = np.array([between(odometry[:-1], odometry[1:]) - [0.05, 0, 0] for odometry, _ in found]).sum(axis=1)
-    claimed = np.diagonal(found[0][1].sum(axis=0))
-    assert np.mean(steps**2, axis=0) / claimed == pytest.approx(1, abs=0.25)
+    variance = np.diagonal(found[0][1].sum(axis=0))
+    assert np.mean(steps**2, axis=0) / variance == pytest.approx(1, abs=0.25)
 
 
 def test_poses_must_be_there(clone, tmp_path):

@@ -50,16 +50,16 @@ def test_follows_walls(way):
     assert normalised < 2
 
 
-def test_rates_of_turning_are_believed_where_nothing_is_seen(way):
-    """A sensor that sees nothing and is said to turn at 0.4 rad/s for two seconds has turned by 0.8 rad; said with a
-    doubt of 1000 rad/s, which tells nothing, it has not, and its claim says how little is known."""
+def test_yaw_rates_are_integrated_without_returns(way):
+    """Without returns, a yaw rate of 0.4 rad/s over two seconds gives a change of yaw of 0.8 rad. With a standard
+    deviation of 1000 rad/s it has no effect, and the covariance is large."""
     frames = 61
     times = np.arange(frames) * CONFIG.frame_period
     nothing = np.full((frames, len(BEARINGS)), np.inf)
 
-    def track(doubt: float):
-        told = np.column_stack([np.full(frames, 0.4), np.full(frames, doubt**2)])
-        return ScanMatching(FAR, lambda batch: told).update(of_scans(SIGNAL, nothing, times))
+    def track(deviation: float):
+        rates = np.column_stack([np.full(frames, 0.4), np.full(frames, deviation**2)])
+        return ScanMatching(FAR, lambda batch: rates).update(of_scans(SIGNAL, nothing, times))
 
     sure, unsure = track(0.01), track(1000.0)
     assert abs(sure.pose[-1, 2] - 0.4 * times[-1]) < 0.02 * 0.4 * times[-1]
@@ -75,15 +75,15 @@ def test_batches_do_not_matter(way):
     assert np.array_equal(np.concatenate(parts)[:50], whole.pose)
 
 
-def test_nothing_to_see_keeps_the_motion(way):
-    """Blind for half a second: motion goes on as it was, and is known less well."""
+def test_motion_is_extrapolated_without_returns(way):
+    """Without returns for half a second, motion is extrapolated and its covariance grows."""
     poses, times, scans = way
     matching = ScanMatching(FAR)
     before = matching.update(of_scans(SIGNAL, scans[:100], times[:100]))
-    blind = matching.update(of_scans(SIGNAL, np.full_like(scans[100:115], np.inf), times[100:115]))
-    assert np.allclose(blind.velocity, before.velocity[-1])
-    assert blind.errors.noise[-1, 0, 0] > before.errors.noise[-1, 0, 0]
-    assert np.allclose(between(before.pose[-1], blind.pose[-1])[:2], [15 * 0.025, 0], atol=0.05)
+    without = matching.update(of_scans(SIGNAL, np.full_like(scans[100:115], np.inf), times[100:115]))
+    assert np.allclose(without.velocity, before.velocity[-1])
+    assert without.errors.noise[-1, 0, 0] > before.errors.noise[-1, 0, 0]
+    assert np.allclose(between(before.pose[-1], without.pose[-1])[:2], [15 * 0.025, 0], atol=0.05)
 
 
 def test_stamps_must_ascend(way):

@@ -105,16 +105,16 @@ def test_labels_of_milliego_are_motions_seen_from_the_older_frame():
         assert (turned[a] * euler * turned[b].inv()).magnitude() == pytest.approx(0, abs=1e-5)
 
 
-def test_mirrored_and_turned_items_are_consistent():
-    """What augmentation does to readings it does to labels: force by the label itself stays so."""
+def test_augmentation_transforms_inputs_and_labels_equally():
+    """The specific force is set to the label; after augmentation both are still equal, except bias and tilt."""
     generator = torch.Generator().manual_seed(0)
     label = torch.randn(64, 3, 3, generator=generator)
     windows = torch.cat([label, torch.zeros_like(label)], dim=2)[:, :, None].expand(-1, -1, 100, -1)
-    found, told = TASKS["rnin"].augment(windows, label, generator)
-    off = (found[..., :3] - told[:, :, None]).norm(dim=3)
+    found, rotated = TASKS["rnin"].augment(windows, label, generator)
+    off = (found[..., :3] - rotated[:, :, None]).norm(dim=3)
     assert off.max() < 0.18 + 2 * np.sin(np.radians(5)) * (9.81 + 5)  # bias, and gravity on tilted axes
-    assert told.norm(dim=2) == pytest.approx(label.norm(dim=2), abs=1e-4)
-    assert told[..., 2] == pytest.approx(label[..., 2], abs=1e-5) and (told - label).abs().max() > 1
+    assert rotated.norm(dim=2) == pytest.approx(label.norm(dim=2), abs=1e-4)
+    assert rotated[..., 2] == pytest.approx(label[..., 2], abs=1e-5) and (rotated - label).abs().max() > 1
     vectors = torch.randn(5, 3, generator=generator)
     assert rotation(vectors).numpy() == pytest.approx(Rotation.from_rotvec(vectors.numpy()).as_matrix(), abs=1e-5)
 

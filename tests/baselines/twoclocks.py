@@ -1,4 +1,4 @@
-"""A walk through a made-up world whose radar and lidar are numbered from 0 on, but have clocks of their own."""
+"""A walk through a synthetic world, whose radar and lidar count frames from 0 but have different clocks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,19 +16,19 @@ POINTS = np.random.default_rng(0).uniform(-12, 12, (150, 2))
 
 @dataclass(frozen=True)
 class MadeUp(Walk):
-    """Walks and turns through the world: the radar's frame is of the instant of the lidar's `first + rate * frame`."""
+    """A walk with turns: the radar's frame k has the time of the lidar's frame `first + rate * k`."""
 
     first: float = 0.0
     rate: float = 1.0
     speed: float = 1.0
 
     def pose(self, instant: float) -> tuple[float, float, float]:
-        """x, y (m), yaw (rad) at an instant in frames of the lidar."""
+        """Return x, y (m), yaw (rad) at a time in frames of the lidar."""
         time = 0.05 * self.speed * instant
         return 0.5 * time - 5, 2 * np.sin(0.3 * time), 0.6 * np.sin(0.5 * time)
 
     def seen(self, instant: float, columns: int, farther: float) -> np.ndarray:
-        """Polar cells that points are in, at an instant in frames of the lidar."""
+        """Return the polar cells that contain points, at a time in frames of the lidar."""
         x, y = transform(inverse(np.array(self.pose(instant))), POINTS).T
         distance, azimuth = np.hypot(x, y) + farther, np.degrees(np.arctan2(y, x))
         inside = (distance < polar.REACH) & (np.abs(azimuth) < 89)
@@ -44,7 +44,7 @@ class MadeUp(Walk):
         return self.seen(frame, polar.BEAMS, 0.0)
 
     def write(self, data: Path) -> Path:
-        """As a data set, below its ``test``."""
+        """Write the walk as a test walk of a data set."""
         for kind, picture in (("radar", self.radar), ("lidar", lambda frame: 255 * self.lidar(frame).astype(np.uint8))):
             (data / "test" / kind).mkdir(parents=True)
             for frame in range(self.frames):

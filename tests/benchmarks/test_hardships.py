@@ -1,4 +1,4 @@
-"""What conditions do to samples and walks, against closed forms."""
+"""Hard conditions of samples and walks, compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -25,8 +25,8 @@ def plain() -> Scenario:
     )
 
 
-@pytest.mark.parametrize("name, gain_db, degrees", [("phases off by 10 deg", 0, 10), ("gains off by 1 dB", 1, 0)])
-def test_channels_are_off_alike_in_all_frames(name, gain_db, degrees):
+@pytest.mark.parametrize("name, gain_db, degrees", [("phase errors of 10 deg", 0, 10), ("gain errors of 1 dB", 1, 0)])
+def test_channel_errors_are_the_same_in_all_frames(name, gain_db, degrees):
     rng = np.random.default_rng(0)
     adc = rng.integers(-20000, 20000, (2, 4, 3, 4, 8, 2)).astype(np.int16)
     hurt = CONDITIONS[name].hurt(Samples(adc, np.arange(2.0), np.ones((2, 4, 3), bool)), rng).adc
@@ -38,8 +38,8 @@ def test_channels_are_off_alike_in_all_frames(name, gain_db, degrees):
         assert 0.6 * most <= found <= 1.01 * most + 0.01
 
 
-def test_noise_grows_by_six_decibels_whatever_stands_in_the_room():
-    """Walls at any range, next to the farthest ones, too, are no noise."""
+def test_noise_increases_by_six_decibels_in_any_room():
+    """Walls at any range, including the largest ones, do not count as noise."""
     rng, shape = np.random.default_rng(0), (2, 32, 3, 4, 96)
     walls = 2000 * np.exp(2j * np.pi * np.outer(rng.uniform(0, 96, 40), np.arange(96)) / 96).sum(axis=0) / 8
     noise = 8.0 * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
@@ -48,7 +48,7 @@ def test_noise_grows_by_six_decibels_whatever_stands_in_the_room():
     assert (hurt.astype(float) - adc).std() == pytest.approx(8.0 * np.sqrt(3), rel=0.05)
 
 
-def test_a_mounting_tilts_the_sensor_whichever_way_it_looks(plain):
+def test_a_mounting_tilts_the_sensor_at_any_heading(plain):
     times = np.linspace(0, 2, 7)
     for change, axis in (({"pitch": 10.0}, [1, 0, 0]), ({"roll": 10.0}, [0, 1, 0])):
         tilted = mounted(**change)(plain).motion

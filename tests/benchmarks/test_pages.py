@@ -1,4 +1,4 @@
-"""Published pages: nobody can tell what a figure is worth if its command is gone, or if docs say another one."""
+"""Pages of results: their commands exist, and figures in docs agree with them."""
 
 import importlib
 import shlex
@@ -16,12 +16,12 @@ from radarsim import cli as radarsim
 
 PLACE = make.Place(PARTS, Path(), Path(), False, None, None)
 LISTED = {name: about for page in make.PAGES.values() for name, about in page["parts"].items()}
-#: Parts that scripts of release 1.0 made, whose commands are those of that release, until they are made anew.
+#: Parts that were made by scripts of release 1.0, with commands of that release.
 FORMER = {"walks", "long_walks"}
 
 
 def understood(command: str) -> None:
-    """Raises: SystemExit, ImportError or AssertionError: a command that is none."""
+    """Parse a command; SystemExit, ImportError or AssertionError if it is invalid."""
     program, *words = shlex.split(command)
     if program in ("radarize", "radarsim"):
         app = typer.main.get_command({"radarize": radarize, "radarsim": radarsim}[program].app)
@@ -52,7 +52,7 @@ def test_a_page_is_made_of_its_parts(name):
 
 @pytest.mark.parametrize("name", LISTED)
 def test_a_part_has_a_command(name):
-    """As it was made, and as it would be made now, at length and in short."""
+    """The command of the existing part, and the present ones, in full and as a short trial."""
     about = LISTED[name]
     path = PARTS / f"{name}.json"
     if path.is_file() and name not in FORMER:
@@ -71,7 +71,7 @@ def test_figures_of_the_docs_are_those_of_the_pages():
         assert figures.written(text) == text, page
 
 
-def test_a_figure_that_changed_is_written_anew():
+def test_a_changed_figure_is_updated():
     stale = "On them it is <!-- figures: walks-mean -->0.99 and 0.999 m<!-- end -->, and so on."
     assert figures.walks_mean() in figures.written(stale) and "0.99" not in figures.written(stale)
     with pytest.raises(KeyError, match="walk-mean"):
@@ -96,7 +96,7 @@ def test_a_short_trial_has_few_short_recordings():
         "python benchmarks/soak.py",
     ],
 )
-def test_commands_that_are_none_are_noticed(command):
+def test_invalid_commands_are_detected(command):
     with pytest.raises((SystemExit, ImportError, AssertionError)):
         understood(command)
 
@@ -110,5 +110,5 @@ def test_commands_that_are_none_are_noticed(command):
         "python -m benchmarks.soak --minutes 5",
     ],
 )
-def test_commands_that_are_some_are_understood(command):
+def test_valid_commands_are_parsed(command):
     understood(command)

@@ -1,4 +1,4 @@
-"""Measures of how like real pictures simulated ones are."""
+"""Statistics of pictures, and the discriminator of real and simulated pictures."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def dots(rows, columns, greys):
 
 
 def test_peaks_and_their_change():
-    """Three dots, of which one fades by 51 greys (5.2 dB), one moves by a row and one goes."""
+    """Three points: one decreases by 51 grey levels (5.2 dB), one moves by a row, and one vanishes."""
     first, later = dots([50, 100, 200], [10, 30, 50], [255, 153, 204]), dots([50, 101], [10, 30], [255, 102])
     bursts = np.stack([[first, *[later] * 4]])
     found = statistics.of(bursts)
@@ -38,9 +38,10 @@ def test_peaks_and_their_change():
     assert found["cells kept %"] == pytest.approx(100 * 11 / 5 / polar.ROWS / polar.COLUMNS)
 
 
-@pytest.mark.parametrize(("fewer", "told_apart"), [(0, (0.2, 0.8)), (40, (0.95, 1.0))])
-def test_the_discriminator(monkeypatch, fewer, told_apart):
-    """Pictures of sixty dots are told from those of twenty, in walks it has not seen, and not from others of sixty."""
+@pytest.mark.parametrize(("fewer", "accuracy"), [(0, (0.2, 0.8)), (40, (0.95, 1.0))])
+def test_the_discriminator(monkeypatch, fewer, accuracy):
+    """On test walks, pictures of 60 points are distinguished from those of 20 points, but not from others of 60
+    points."""
     monkeypatch.setattr(discriminator, "EPOCHS", 8)
     rng = np.random.default_rng(0)
 
@@ -51,7 +52,7 @@ def test_the_discriminator(monkeypatch, fewer, told_apart):
         return pictures.reshape(16, 1, 64, 32)
 
     judged = discriminator.judge([walk(60) for _ in range(10)], [walk(60 - fewer) for _ in range(10)], 1)
-    assert told_apart[0] <= judged.accuracy.mean() <= told_apart[1]
+    assert accuracy[0] <= judged.accuracy.mean() <= accuracy[1]
     assert len(judged.real) == len(judged.simulated) == 10 and all(len(each) == 16 for each in judged.simulated)
 
 

@@ -1,4 +1,4 @@
-"""A script writes what it found, and what it is of, where it is told to."""
+"""A script writes its results with their provenance to the output folder."""
 
 from benchmarks import motion_statistics
 from radarize.evaluation.benchmark.results import Results

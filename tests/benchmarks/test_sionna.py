@@ -1,4 +1,4 @@
-"""Sionna RT's paths turned into samples: right where the solver is right."""
+"""Samples from Sionna RT's paths are correct if the paths are."""
 
 import numpy as np
 import pytest
@@ -21,19 +21,19 @@ CONFIG = PRESETS["radarize"]
 
 @pytest.fixture(scope="module")
 def wall():
-    """One metal wall, its foot point 20 deg to the left and 2.5 m away."""
+    """A metal wall with its specular point 20 deg to the left at 2.5 m."""
     normal = np.array([np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20)), 0])
     mesh = rectangle(tuple(2.5 * normal), (8, 8), tuple(-normal))
     return Scene("wall", [SceneObject("wall", mesh, MATERIALS["metal"])])
 
 
-def test_wall_flash(wall):
-    """lambda / (8 pi R) at the foot point, approached at v cos(20 deg) by a sensor that moves ahead."""
+def test_specular_reflection_of_a_wall(wall):
+    """The amplitude is lambda / (8 pi R), and the closing speed v cos(20 deg) for a sensor that moves forward."""
     rig = Rig(velocity=(0.8, 0, 0))
     middle = np.array([CONFIG.burst_center])
     paths = PathSolverFinder(wall, CONFIG, antenna=ISOTROPIC)(rig.position(middle)[0], np.eye(3))
-    flash = np.argmax(np.abs(paths.amplitude))
-    single = np.arange(len(paths)) == flash
+    strongest = np.argmax(np.abs(paths.amplitude))
+    single = np.arange(len(paths)) == strongest
     lengths = paths.lengths(CONFIG, rig, 0.0)[single]
     signal = Synthesizer(CONFIG)(lengths, paths.amplitude[single])
     away = 2.5 - 0.8 * CONFIG.burst_center * np.cos(np.deg2rad(20))
@@ -47,9 +47,10 @@ def test_wall_flash(wall):
 
 @pytest.mark.parametrize("velocity", [(0.9, 0, 0), (0, -1.1, 0), (0, 0.5, 0.6)])
 def test_one_point_of_a_small_board(velocity):
-    """A diffuse path to a 20 cm board 25 deg to the right and 10 deg up: it is where that point is, and closes as it.
+    """A diffuse path to a 20 cm board 25 deg to the right and 10 deg up has the position and closing speed of its
+    point.
 
-    The point is where the path meets the board's plane, from the path's length alone as a check of its directions.
+    The point is computed from the length of the path and the plane of the board, as a check of the path's directions.
     """
     towards = polar(1.0, -25, 10)
     board = rectangle(tuple(3.0 * towards), (0.2, 0.2), tuple(-towards))
@@ -61,7 +62,7 @@ def test_one_point_of_a_small_board(velocity):
     assert np.abs((points - 3.0 * towards) @ towards).max() < 2e-3
     off = np.linalg.norm(points - 3.0 * towards, axis=1)
     assert off.max() < 0.15
-    one = np.arange(len(paths)) == np.argmax(off)  # not the flash
+    one = np.arange(len(paths)) == np.argmax(off)  # not the specular reflection
     signal = Synthesizer(CONFIG)(paths.lengths(CONFIG, rig, 0.0)[one], paths.amplitude[one])
     array = middle + virtual_positions(CONFIG).mean(axis=(0, 1)) / 2
     x, y, z = place = points[one][0] - array
@@ -81,7 +82,7 @@ def test_same_pose_same_paths(wall):
 
 
 def test_frames_of_a_scenario():
-    """The strongest range of a frame is the wall's, 3 m."""
+    """The strongest echo of a frame has the range of the wall, 3 m."""
     scenario = SionnaScenario.of(Scenario(Scene.load("physics/wall"), Motion.still((0, 0, 0)), CONFIG))
     adc = scenario.frames(np.zeros(1)).samples[0].astype(float)
     power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))

@@ -1,4 +1,4 @@
-"""Evaluation of whole runs, against a room whose answer is known."""
+"""Evaluation of whole runs in a room with known errors."""
 
 import json
 
@@ -28,7 +28,7 @@ def test_metrics_of_a_known_run(run):
     assert metrics["slam"]["ate"]["position"]["mean"] < 0.05
     assert metrics["odometry"]["ate"]["rotation"]["mean"] == pytest.approx(0.03, abs=0.03)
     assert metrics["odometry"]["re"]["second"]["rotation"]["mean"] == pytest.approx(0.006, rel=1e-3)
-    # Over a metre: too long by 4 cm, and to the side by as much as the heading is off by then.
+    # Over a metre: a position error of 4 cm along the path, and a lateral one by the heading error at that time.
     expected = np.mean(np.hypot(0.04, 0.006 * np.arange(0, 20, 0.1)))
     assert metrics["odometry"]["re"]["metre"]["position"]["mean"] == pytest.approx(expected, rel=0.1)
     # 30 % of the bearings are missing, the rest has 3 cm noise along the beam: erf(10 / 3 / sqrt(2)) within 10 cm.

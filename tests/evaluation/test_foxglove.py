@@ -46,13 +46,13 @@ class Client:
                 which, stamp = struct.unpack_from("<IQ", got, 1)
                 return self.topics[which], stamp, self._kinds[which].FromString(got[13:])
 
-    def _hear(self, said: dict) -> None:
-        if said["op"] != "advertise":
+    def _hear(self, message: dict) -> None:
+        if message["op"] != "advertise":
             return
-        for channel in said["channels"]:
+        for channel in message["channels"]:
             self.topics[channel["id"]] = channel["topic"]
             self._kinds[channel["id"]] = decoder(base64.b64decode(channel["schema"]), channel["schemaName"])
-        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in said["channels"]]
+        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in message["channels"]]
         self._socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 
 

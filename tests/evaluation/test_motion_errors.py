@@ -1,4 +1,4 @@
-"""Velocity and turn errors against what was put in."""
+"""Statistics of velocity and yaw errors of known size."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from radarize.evaluation.motion import turn_errors, velocity_errors
 
 
-def test_errors_bias_and_honesty_are_what_was_put_in():
+def test_errors_bias_and_nees_have_the_known_values():
     rng = np.random.default_rng(0)
     heading = rng.uniform(0, 2 * np.pi, 20000)
     direction = np.stack([np.cos(heading), np.sin(heading)], axis=1)
@@ -19,13 +19,13 @@ def test_errors_bias_and_honesty_are_what_was_put_in():
     assert found["left"] == pytest.approx(np.hypot(0.02, 0.03), rel=0.02)
     assert found["bias"] == pytest.approx(0, abs=1e-3)
     assert found["nees"] == pytest.approx(1, rel=0.02) and found["nees_median"] == pytest.approx(1, rel=0.03)
-    # Claims twice as sure as justified, and a tenth too fast in whatever direction.
+    # The covariance is a quarter of the true one, and velocities are 10 % too large in any direction.
     assert velocity_errors(direction + noise, direction, covariance / 4)["nees"] == pytest.approx(4, rel=0.02)
     assert velocity_errors(1.1 * direction, direction)["bias"] == pytest.approx(0.1)
     assert velocity_errors(0.9 * direction, direction)["bias"] == pytest.approx(-0.1)
 
 
-def test_an_outlier_moves_the_mean_of_honesty_but_not_its_median():
+def test_an_outlier_changes_the_mean_nees_but_not_the_median():
     rng = np.random.default_rng(1)
     true, noise = np.zeros((1001, 2)), rng.normal(size=(1001, 2))
     noise[0] = 100

@@ -1,4 +1,4 @@
-"""What wrong returns come from, by a recording that knows; missed surfaces."""
+"""Wrong returns by path types of a recording; missed surfaces."""
 
 import h5py
 import numpy as np
@@ -18,7 +18,7 @@ OLD_LABELS = ("direct", "floor_ceiling", "ghost_1", "ghost_2", "ghost_3", "throu
 BEARINGS = np.radians(np.arange(-44.0, 44.0))
 
 
-def test_a_surface_is_missed_where_nothing_stands_for_it():
+def test_a_surface_is_missed_without_a_return_at_it_or_in_front_of_it():
     true = np.array([[2.0, 2.0, 2.0, 2.0, 2.0, np.inf]])
     #                     at it  before  ghost  none   zero  none there
     measured = np.array([[2.09, 1.0, 2.5, np.inf, 0.0, 3.0]])
@@ -27,7 +27,7 @@ def test_a_surface_is_missed_where_nothing_stands_for_it():
 
 
 def record(path, times, cause, labels=LABELS):
-    """A recording with every frame of which one whole bearing has one cause."""
+    """Write a recording, in each frame of which one whole bearing has one path type."""
     streams = {"truth/cause": Stream(cause.shape[1:], "u1", "", "strongest cause", labels=labels)}
     axes = {"ranges": 0.0446 * np.arange(cause.shape[1]), "azimuths": BEARINGS}
     products = {f"truth/cause_{name}": Product(axis, "", "") for name, axis in axes.items()}
@@ -38,8 +38,8 @@ def record(path, times, cause, labels=LABELS):
 
 
 @pytest.mark.parametrize("labels", [LABELS, OLD_LABELS])
-def test_what_wrong_returns_come_from(tmp_path, labels):
-    """Causes are given frame by frame, and some frames are not in the run: figures must find the right ones."""
+def test_sources_of_wrong_returns(tmp_path, labels):
+    """Path types are stored per frame, and the run lacks some frames: each scan must be compared with its own frame."""
     run = write_run(tmp_path / "run")
     with h5py.File(run / "scans.h5", "r+") as file:
         file["ranges"][::3] = file["ranges"][::3] + 0.3
@@ -64,7 +64,7 @@ def test_what_wrong_returns_come_from(tmp_path, labels):
     assert 0.5 < missed(scans["ranges"], true) < 0.56
 
 
-def test_a_recording_that_knows_no_causes(tmp_path):
+def test_a_recording_without_path_types(tmp_path):
     scans = Scans(write_run(tmp_path / "run") / "scans.h5")
     times = scans["time"] - 0.01
     path = record(tmp_path / "a.h5", times, np.zeros((len(times), 96, len(BEARINGS)), np.uint8), labels=())

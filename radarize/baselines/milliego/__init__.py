@@ -1,1 +1,1 @@
-"""milliEgo (Lu et al., SenSys 2020): a sparse point cloud and an IMU."""
+"""milliEgo (Lu et al., SenSys 2020): odometry from a sparse point cloud and an IMU."""

@@ -1,4 +1,4 @@
-"""milliEgo: motion from a radar's sparse points and an IMU, each telling what of the other to believe.
+"""milliEgo: motion from a radar's sparse points and an IMU, with cross-attention between both branches.
 
 Lu et al., "milliEgo: single-chip mmWave radar aided egomotion estimation via deep sensor fusion", SenSys 2020.
 """
@@ -11,23 +11,23 @@ from torch import Tensor, nn
 
 from radarize.learning.nets.weights import Network
 
-#: s, from one panorama to the next.
+#: Time between the panoramas of a pair, s.
 PAIR = 0.2
 #: Rows and columns of a panorama.
 ROWS, COLUMNS = 64, 256
-#: IMU samples from one panorama to the next: specific force and angular velocity.
+#: IMU samples between two panoramas: specific force and angular velocity.
 SAMPLES = 20
 #: Channels over the width, kernel and stride of the radar's convolutions, which are those of FlowNetS's encoder
 #: (Dosovitskiy et al., "FlowNet", 2015).
 _ENCODER = ((1, 7, 2), (2, 5, 2), (4, 5, 2), (4, 3, 1), (8, 3, 2), (8, 3, 1), (8, 3, 2), (8, 3, 1), (16, 3, 2))
-#: Units of the outputs for a radian: turns are told in degrees.
+#: Degrees per radian: the network's rotations are in degrees.
 DEGREES = 57.29577951308232
-#: deg, a turn that the last layer calls 1: no larger than a step in metres, or it would be learned long after that.
+#: Rotation for an output of 1 of the last layer, deg: similar in size to a step in metres, so that both are learned.
 _TURN = 10.0
 
 
 class Heads(nn.Module):
-    """Two stacks of layers on the same features: translation (m), and Euler angles (deg)."""
+    """Two output heads on the same features: translation (m) and Euler angles (deg)."""
 
     def __init__(self, inputs: int, width: int):
         super().__init__()
@@ -43,14 +43,14 @@ class Heads(nn.Module):
 
 
 class MilliEgoNet(Network):
-    """Pairs of panoramas and the IMU's samples between them to the motion from each to the next.
+    """Network from pairs of panoramas and the IMU samples between them to the motion between the panoramas.
 
-    Gates are of channels: a squeeze-and-excitation gate on the radar's (Hu et al., "Squeeze-and-excitation networks",
-    2018), then each branch's gates on the other's.
+    Channels are weighted by gates: a squeeze-and-excitation gate on the radar's channels (Hu et al.,
+    "Squeeze-and-excitation networks", 2018), then gates of each branch on the channels of the other.
 
     Args:
-        frames: of a window, oldest first; one more than motions.
-        maps: names of what it reads of a frame.
+        frames: frames of a window, oldest first; one more than motions.
+        maps: names of the inputs of a frame.
         width: channels of the first convolution; 64 in the original, with 33.98 M parameters.
     """
 
@@ -75,9 +75,9 @@ class MilliEgoNet(Network):
         features = channels * rows * columns + 2 * width * SAMPLES
         self.memory = nn.LSTM(features, 8 * width, 2, batch_first=True)
         self.heads = Heads(8 * width, width)
-        #: m/s^2 and rad/s that become 1: gravity alone would fill an LSTM's gates.
+        #: Scale of the IMU's inputs, m/s^2 and rad/s: without it, gravity would saturate the LSTM's gates.
         self.register_buffer("scale", torch.tensor([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]), persistent=False)
-        #: Mean squared errors on validation data: x, y (m^2), yaw (rad^2).
+        #: Mean squared error on validation data: x, y (m^2), yaw (rad^2).
         self.register_buffer("error", torch.ones(3))
         if not self.error.is_meta:  # only sizes are wanted
             _begin(self)
@@ -85,7 +85,7 @@ class MilliEgoNet(Network):
     def features(
         self, panorama: Float[Tensor, "item 2 row column"], imu: Float[Tensor, "item sample 6"]
     ) -> Float[Tensor, "item feature"]:
-        """Of pairs: two panoramas (0...1), older first, and the IMU's samples between them (m/s^2, rad/s)."""
+        """Compute features of pairs of panoramas (0...1, older first) and IMU samples between them (m/s^2, rad/s)."""
         x = self.radar(panorama.repeat_interleave(3, dim=1))
         x = x * self.squeeze(x.mean(dim=(2, 3)))[:, :, None, None]
         y = self.inertial(imu / self.scale)[0]
@@ -93,13 +93,14 @@ class MilliEgoNet(Network):
         return torch.cat([(x * of_radar[:, :, None, None]).flatten(1), (y * of_inertial[:, None]).flatten(1)], dim=1)
 
     def recall(self, features: Float[Tensor, "item pair feature"]) -> Float[Tensor, "item pair 6"]:
-        """Motions of consecutive pairs: translation (m) in the older frame's axes, Euler angles x y z (deg)."""
+        """Estimate motions of consecutive pairs: translation (m) in the older frame's axes, Euler angles x y z
+        (deg)."""
         return self.heads(self.memory(features)[0])
 
     def forward(
         self, panorama: Float[Tensor, "item frame row column"], imu: Float[Tensor, "item frame sample 6"]
     ) -> Float[Tensor, "item pair 6"]:
-        """As `recall`; of the IMU, samples up to each frame."""
+        """Estimate motions as `recall` does, from panoramas and the IMU samples up to each frame."""
         pairs = torch.stack([panorama[:, :-1], panorama[:, 1:]], dim=2)
         found = self.features(pairs.flatten(0, 1), imu[:, 1:].flatten(0, 1))
         return self.recall(found.unflatten(0, pairs.shape[:2]))
@@ -107,18 +108,18 @@ class MilliEgoNet(Network):
     def estimate(
         self, panorama: Float[Tensor, "item frame row column"], imu: Float[Tensor, "item frame sample 6"]
     ) -> tuple[Float[Tensor, "item 3"], Float[Tensor, "item 3 3"]]:
-        """Planar motion of the newest pair, x, y (m) and yaw (rad), and its covariance, the same for all."""
+        """Estimate planar motion of the newest pair, x, y (m) and yaw (rad), and its covariance, which is constant."""
         return self.planar(self(panorama, imu)[:, -1])
 
     def planar(self, motion: Float[Tensor, "item 6"]) -> tuple[Float[Tensor, "item 3"], Float[Tensor, "item 3 3"]]:
-        """What `estimate` makes of motions."""
+        """Reduce motions to x, y (m) and yaw (rad), with the covariance of the validation errors."""
         mean = torch.cat([motion[:, :2], motion[:, 5:] / DEGREES], dim=1)
         return mean, torch.diag(self.error).expand(motion.shape[0], -1, -1)
 
 
 def _begin(net: nn.Module) -> None:
-    """First weights as large as what goes in (Glorot, He, orthogonal): torch's own are so small for so many layers that
-    what comes out hardly depends on it, and stays so."""
+    """Initialise weights by Glorot, He and orthogonal matrices. With torch's smaller defaults, the output of this many
+    layers hardly depends on the input, and training does not converge."""
     for module in net.modules():
         if isinstance(module, nn.Conv2d):
             nn.init.kaiming_normal_(module.weight, a=0.1)
@@ -129,7 +130,7 @@ def _begin(net: nn.Module) -> None:
                 if "bias" in name:
                     nn.init.zeros_(values)
                     gates = values.detach().chunk(4)
-                    gates[1].fill_(0.5)  # there are two biases: it remembers, at first
+                    gates[1].fill_(0.5)  # forget gate; there are two biases, which sum to 1
                     continue
                 for gate in values.detach().chunk(4):
                     nn.init.orthogonal_(gate) if "_hh_" in name else nn.init.xavier_uniform_(gate)

@@ -1,4 +1,4 @@
-"""milliEgo as odometry of a stream of frames: motions over 0.2 s, told anew at every frame."""
+"""milliEgo as odometry of a stream of frames: motions over 0.2 s, estimated at every frame."""
 
 import numpy as np
 import torch
@@ -15,12 +15,12 @@ from radarize.odometry.smoother import FixedLagSmoother
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
 
-#: rad/s^1.5 and rad/s: by how much a walker's turning wanders in a second, and of a rate not known at all.
+#: Yaw-rate random walk of a person, rad/s^1.5; standard deviation of an unknown yaw rate, rad/s.
 _TWIST, _FASTEST_TURN = np.radians(33.0), np.radians(60.0)
 
 
 class MilliEgoOdometry(InertialOdometry):
-    """Odometry by `MilliEgoNet`: from sparse points and an IMU."""
+    """Odometry by `MilliEgoNet` from sparse points and an IMU."""
 
     network, lasts = MilliEgoNet, PAIR
 
@@ -32,7 +32,7 @@ class MilliEgoOdometry(InertialOdometry):
 
     @torch.inference_mode()
     def update(self, batch: Batch) -> Track:
-        """Poses of the next frames."""
+        """Estimate poses of the next frames."""
         centers = batch.centers
         steps = intervals(centers, self.path.time)
         shown = panoramas(*batch.points, len(batch))
@@ -43,7 +43,7 @@ class MilliEgoOdometry(InertialOdometry):
             kept = max(len(stamps) - self.path.reach * (self._frames - 1), 0)
             self._past = stamps[kept:], shown[kept:]
             apart = self.path.reach * self._period
-            # What is older than the newest pair is memory only: where it is missing, the rest tells the displacement.
+            # Frames before the newest pair are memory only: without them, the displacement follows from the pair.
             rows, _ = spaced(stamps, len(centers), self._frames, apart, self._period)
             ago = centers[:, None] - apart * np.arange(self._frames - 1, -1, -1)
             imu = self.imu.latest(ago.ravel(), SAMPLES).reshape(*ago.shape, SAMPLES, 6)

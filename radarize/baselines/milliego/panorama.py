@@ -1,4 +1,4 @@
-"""What milliEgo sees of a radar: panoramic depth images of its sparse points."""
+"""Panoramic depth images of a radar's sparse points: the input of milliEgo."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -8,11 +8,11 @@ from radarize.io.recording import Recording
 from radarize.signal.heatmaps import Heatmaps
 from radarize.signal.points import DENSE, PointClouds
 
-#: Half the field, rad: to the sides, up and down.
+#: Half the field of view in azimuth and in elevation, rad.
 _ASIDE, _UP = np.radians(60.0), np.radians(45.0)
-#: m, what a depth of 1 stands for.
+#: Range of a depth of 1, m.
 _FAR = 5.0
-#: Rows and columns around a point that it covers, to either side.
+#: Rows and columns on either side of a point that it covers.
 _SPOT = (1, 2)
 _BATCH = 32
 
@@ -20,10 +20,10 @@ _BATCH = 32
 def panoramas(
     points: Float[np.ndarray, "point 6"], frame: Int[np.ndarray, "point"], frames: int
 ) -> Float[np.ndarray, "frame row column"]:
-    """Depth images of point clouds, see `PointClouds`: 0 where there is no point, the nearest one wins.
+    """Render depth images of point clouds (`PointClouds`): the nearest point of each pixel, 0 without points.
 
     Returns:
-        depth over 5 m, at most 1; rows from top to bottom, columns from right to left.
+        Depth over 5 m, at most 1; rows from top to bottom, columns from right to left.
     """
     depth = np.linalg.norm(points[:, :3], axis=1)
     row = np.floor(ROWS * (0.5 - np.arcsin(points[:, 2] / np.maximum(depth, 1e-9)) / (2 * _UP))).astype(int)
@@ -39,10 +39,10 @@ def panoramas(
 
 
 def seen(recording: Recording, frames: slice) -> Float[np.ndarray, "frame row column"]:
-    """Panoramas of a recording's frames.
+    """Render panoramas of a recording's frames.
 
     Raises:
-        InputError: it has no samples.
+        InputError: the recording has no samples.
     """
     heatmaps, clouds = Heatmaps(recording.config), PointClouds(recording.config, DENSE)
     wanted = range(*frames.indices(len(recording)))

@@ -1,4 +1,4 @@
-"""milliEgo's training: its paper's loss and hyper-parameters, but for the width."""
+"""Training of milliEgo with its paper's loss and hyper-parameters, except the width."""
 
 from collections.abc import Iterable, Sequence
 
@@ -22,7 +22,8 @@ def _latest(recording: Recording, frames: slice) -> Float[np.ndarray, "frame sam
 
 
 class MilliEgo(Task[tuple[Tensor, ...]]):
-    """Motions between panoramas 0.2 s apart: translation (m) in the older one's axes, and Euler angles (deg)."""
+    """Training task: motion between panoramas 0.2 s apart, translation (m) in the older one's axes, Euler angles
+    (deg)."""
 
     network, truth = MilliEgoNet, (POSE,)
     sensed = (Reading("panorama", "radar/adc", seen), Reading("imu", "imu/time", _latest))
@@ -50,7 +51,7 @@ class MilliEgo(Task[tuple[Tensor, ...]]):
     def augment(
         self, inputs: tuple[Tensor, ...], label: Tensor, generator: Generator
     ) -> tuple[tuple[Tensor, ...], Tensor]:
-        """Half of the items are mirrored, left for right; the original has enough walks to do without."""
+        """Mirror half of the items, left for right; the original does not, but has more walks."""
         panorama, imu = inputs
         left = torch.rand((len(label), 1, 1, 1), generator=generator, device=label.device) < 0.5
         panorama = torch.where(left, panorama.flip(3), panorama)
@@ -73,13 +74,13 @@ class MilliEgo(Task[tuple[Tensor, ...]]):
         return {"loss": loss} | {name: value**0.5 for name, value in zip(names, squares, strict=True)}
 
     def calibrate(self, net: Network, batches: Iterable[tuple[tuple[Tensor, ...], Tensor]]) -> None:
-        """Keep the validation error as everyone's."""
+        """Set the covariance of all estimates to the mean squared validation error."""
         errors = [net.estimate(*inputs)[0] - _planar(label) for inputs, label in batches]
         net.get_buffer("error").copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-6))
 
 
 def _planar(label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item 3"]:
-    """x, y (m) and yaw (rad) of the newest motion."""
+    """Return x, y (m) and yaw (rad) of the newest motion."""
     return torch.cat([label[:, -1, :2], label[:, -1, 5:] / DEGREES], dim=1)
 
 

@@ -1,1 +1,1 @@
-"""Points like a lidar's, and turns, from RadarHD's pictures (`radarize.signal.polar`), by networks of simulation."""
+"""Networks on RadarHD's pictures (`radarize.signal.polar`), trained in simulation: point clouds and changes of yaw."""

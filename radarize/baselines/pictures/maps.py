@@ -1,4 +1,4 @@
-"""Polar pictures as maps that networks see, and what they are made of."""
+"""Polar pictures as input maps of networks, and the antenna signals that they are computed from."""
 
 import numpy as np
 from jaxtyping import Float16
@@ -8,12 +8,12 @@ from radarize.signal import polar
 from radarize.signal.batch import Batch
 from radarize.signal.maps import Axes, Maker
 
-#: Range bins within reach of a picture; numbers of a bin: real and imaginary part of four antennas.
+#: Range bins within the range of a picture; values of a bin: real and imaginary part of four antennas.
 BINS, NUMBERS = 257, 8
 
 
 class PictureMaker(Maker):
-    """Makes polar pictures of one radar configuration, with the beam that the real ones have.
+    """Computes polar pictures of a radar configuration, with the beam width of the real pictures.
 
     Args:
         config: radar configuration.
@@ -21,7 +21,7 @@ class PictureMaker(Maker):
 
     maps = {
         "picture": "RadarHD's picture of one loop, 0...255",
-        "antennas": "what a picture is made of: four antennas over range, the frame's largest magnitude 1",
+        "antennas": "range spectra of the four antennas of a picture, relative to the frame's largest magnitude",
     }
 
     def __init__(self, config: RadarConfig):
@@ -29,13 +29,13 @@ class PictureMaker(Maker):
 
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:
-        """Rows and columns of a map."""
+        """Return the axes of a map."""
         if name == "antennas":
             return Axes(BINS, config.range_resolution, np.arange(float(NUMBERS)))
         return Axes(polar.ROWS, polar.RANGES[1], polar.AZIMUTHS)
 
     def of(self, batch: Batch) -> Float16[np.ndarray, "frame range azimuth"]:
-        """Pictures of a batch's frames: those that are known, or as its samples make them."""
+        """Return the pictures of a batch's frames: those of the recording, or computed from its samples."""
         if "picture" not in batch.known:
             batch.known |= self(batch.samples, names=("picture",))
         return batch.known["picture"].astype(np.float16, copy=False)

@@ -1,4 +1,4 @@
-"""What was seen shortly before."""
+"""Recursive average of a network's distributions over time."""
 
 import math
 
@@ -7,16 +7,16 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-#: s after which a distribution counts 1/e. Chosen on walks 112, 118, 126 and 134: 0.26 m Chamfer distance without,
-#: 0.23 with 0.2 s, 0.22 with 0.4 and with 0.8, 0.23 with 1.2.
+#: Time constant of the average, s. Chosen on walks 112, 118, 126 and 134, by the Chamfer distance: 0.26 m without
+#: averaging, 0.23 m with 0.2 s, 0.22 m with 0.4 s and 0.8 s, 0.23 m with 1.2 s.
 LASTS = 0.5
 
 
 class Memory:
-    """Distributions of a stream, averaged with those before them, the older the less.
+    """Exponentially weighted average of the distributions of a stream.
 
-    Frame by frame a picture's speckle is another, and a network's doubts with it, while the room stays where it is for
-    as long as it takes to walk some decimetres.
+    Speckle, and the network's uncertainty with it, changes from frame to frame, while the surroundings stay nearly the
+    same over a motion of some decimetres.
     """
 
     def __init__(self) -> None:
@@ -26,7 +26,12 @@ class Memory:
     def push(
         self, probability: Float[Tensor, "frame row column"], stamps: Float[np.ndarray, "frame"]
     ) -> Float[Tensor, "frame row column"]:
-        """Averages up to each of the next frames, by their distributions and times (s)."""
+        """Return the averages up to each of the next frames.
+
+        Args:
+            probability: distribution of each frame.
+            stamps: time of each frame, s.
+        """
         found = []
         for each, time in zip(probability, stamps, strict=True):
             known = each if self._known is None else self._known

@@ -1,4 +1,4 @@
-"""A U-Net that says, for each azimuth of a lidar, at which ranges it sees something."""
+"""U-Net from polar pictures to a distribution over the range of a lidar's points, for each azimuth."""
 
 from collections.abc import Sequence
 
@@ -15,19 +15,19 @@ from radarize.learning.nets.weights import Network
 from radarize.signal import polar
 from radarize.signal.maps import Maps
 
-#: Columns that it answers in, of half a circle: four beams of the lidar each.
+#: Columns of the output over half a circle: four beams of the lidar each.
 COLUMNS = 128
-#: Rows that are folded into channels, and unfolded into rows and columns of the answer.
+#: Factor by which rows are folded into channels, and channels into rows and columns of the output.
 _FOLD = 2
 
 
 class PictureNet(Network):
-    """Polar pictures of a second to a distribution over range for every column, and over there being nothing.
+    """Network from the polar pictures of a second to a distribution over range, or no point, for every column.
 
     Args:
-        frames: of a window; the newest one is answered for.
-        maps: names of a frame's maps.
-        width: of the U-Net.
+        frames: frames of a window; the output belongs to the newest.
+        maps: names of the maps of a frame.
+        width: width of the U-Net.
     """
 
     kind, outputs = "pictures", ("probability",)
@@ -37,16 +37,16 @@ class PictureNet(Network):
         super().__init__(frames, maps, width)
         self.unet = UNet(_FOLD * frames * len(self.maps) + 2, _FOLD * COLUMNS // polar.COLUMNS, width)
         self.nothing = nn.Parameter(torch.zeros(()))
-        #: Probability from which on every cell has a point (`points`); training fits it.
+        #: Probability above which every cell has a point (`points`); fitted after training.
         self.register_buffer("dense", torch.tensor(0.03))
 
     def forward(self, maps: Maps) -> Float[Tensor, "item 257 column"]:
-        """Logarithms of the probability of each row, and last, of nothing."""
+        """Compute logarithms of the probability of each row, and in the last row that of no point."""
         image = (maps.flatten(1, 2) / 255).unflatten(2, (-1, _FOLD)).transpose(2, 3).flatten(1, 2)
         logits = pixel_shuffle(self.unet(torch.cat([image, coordinates(image)], dim=1)), _FOLD)[:, 0]
         nothing = self.nothing.expand(len(logits), 1, logits.shape[2])
         return torch.cat([logits, nothing], dim=1).log_softmax(dim=1)
 
     def estimate(self, maps: Maps) -> Float[Tensor, "item 257 column"]:
-        """Probabilities of the same, averaged over a window and its mirror image."""
+        """Estimate the probabilities of `forward`, averaged over a window and its mirror image."""
         return (self(maps).exp() + self(augment.mirrored(maps)).exp().flip(2)) / 2

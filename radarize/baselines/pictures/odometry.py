@@ -1,4 +1,4 @@
-"""Odometry from polar pictures: their scans are matched, and a network tells turns."""
+"""Odometry from polar pictures: scan matching, with yaw rates by a network."""
 
 import numpy as np
 import torch
@@ -12,10 +12,10 @@ from radarize.signal.batch import Batch
 
 
 class PictureRates:
-    """Rates of turning by the network on polar pictures.
+    """Yaw rates by a network on polar pictures.
 
     Attributes:
-        span: s, over which each is averaged.
+        span: time span over which each yaw rate is averaged, s.
 
     Raises:
         InputError: see `PictureStream`.
@@ -27,19 +27,20 @@ class PictureRates:
 
     @torch.inference_mode()
     def rates(self, batch: Batch) -> Float[np.ndarray, "frame 2"]:
-        """Rate of turning over the last frames (rad/s) and its variance; NaN where pictures are missing.
+        """Estimate the yaw rate over the last frames (rad/s) and its variance; NaN where pictures are missing.
 
-        Spans overlap, so that as many rates as fit into one have much the same error: each counts as a share.
+        Time spans overlap, so errors of consecutive frames are correlated: variances are larger by the number of frames
+        in a span.
         """
         shown = self._stream.windows(batch)
         mean, covariance = self._stream.net.estimate(shown.maps)
-        told = np.column_stack([mean[:, 0] / self.span, self._stream.spacing * covariance[:, 0, 0] / self.span**2])
-        return np.where(shown.whole[:, None], told, np.nan)
+        rates = np.column_stack([mean[:, 0] / self.span, self._stream.spacing * covariance[:, 0, 0] / self.span**2])
+        return np.where(shown.whole[:, None], rates, np.nan)
 
 
 def odometry(inputs: Inputs) -> ScanMatching:
-    """By the pipeline's scans."""
+    """Make odometry by matching the pipeline's scans, with yaw rates by the network."""
     return ScanMatching(rates=PictureRates(inputs).rates)
 
 
-METHOD = Method("scan matching, turns by a network", odometry, ("picture-turns",), scans=True)
+METHOD = Method("scan matching, yaw rates by a network", odometry, ("picture-turns",), scans=True)

@@ -1,9 +1,10 @@
-"""What real pictures have and simulated ones lack: drawn at random, so that a network relies on neither.
+"""Augmentation of simulated pictures by random properties of real boards and rooms, so that networks do not rely on
+their absence.
 
-Simulated boards have gains and phases of their own, walls are flatter and rooms emptier than real ones. Here what four
-antennas hear is changed as another board and another room might have done it: gains and phases differ, flashes lose
-what they have above a random level, echoes that nobody explains are added, gain wanders over range, noise comes on top.
-A picture is then made of it as RadarHD makes them, but keeps a random share of its cells, of which some go missing.
+Real boards have channel errors, and real walls are less flat and real rooms less empty than simulated ones. The signals
+of four antennas are changed at random: gains and phases of channels, a limit of the level of specular reflections,
+additional echoes, a gain that varies over range, and noise. A picture is then computed as RadarHD does, except that it
+keeps a random share of its cells, of which some are deleted.
 """
 
 from collections.abc import Callable
@@ -18,21 +19,22 @@ from radarize.radar.presets import PRESETS
 from radarize.signal import polar
 from radarize.signal.maps import Maps
 
-#: Of antennas, standard deviation: gain, dB; phase, rad, at most. Sine of the mount's yaw, at most.
+#: Channel errors: standard deviation of gains, dB; maximum standard deviation of phases, rad; maximum sine of the yaw
+#: of the mounting.
 GAIN, PHASE, YAW = 0.5, 0.15, 0.02
-#: dB re the frame's largest, of what flashes may keep.
+#: Limit of the level of specular reflections, dB relative to the frame's maximum.
 CEILING = (-5.0, 15.0)
-#: Echoes that are added at most, their levels, dB re the largest, and the bins and sines that they wander from frame to
-#: frame, standard deviations.
+#: Additional echoes: maximum number; levels, dB relative to the frame's maximum; standard deviations of their motion
+#: between frames, range bins and sine of azimuth.
 ADDED, LEVELS, WANDER = 8, (-45.0, -15.0), (2.0, 0.02)
-#: dB: gain over range, at either end; its patches, standard deviation at most, and how many there are; noise re the
-#: frame's largest.
+#: Gain over range: maximum slope at either end, dB; maximum standard deviation of random patches, dB; number of
+#: patches. Noise relative to the frame's maximum, dB.
 TILT, PATCHY, PATCHES, NOISE = 2.0, 1.0, 32, (-60.0, -40.0)
-#: Blocks of pixels, a row high, that are missing at most, and columns of one.
+#: Deleted blocks of pixels, one row high: maximum share, and columns per block.
 MISSING, BLOCK = 0.1, 8
-#: Shares of the pixels that are kept: the spread of the training walks (6 to 14 %), and more to either side.
+#: Share of pixels that are kept: wider than the range of the training walks, 6 to 14 %.
 KEPT = (0.02, 0.18)
-#: dB below the largest: where no cell of the radar lies.
+#: Level of pixels without a cell of the radar, dB relative to the maximum.
 FLOOR = -90.0
 
 Draw = Callable[..., Tensor]
@@ -40,11 +42,11 @@ Heard = Complex64[Tensor, "item frame range antenna"]
 
 
 def rough(antennas: Maps, generator: Generator) -> Float[Tensor, "item frame 1 range column"]:
-    """Pictures as another room and another board might have made them.
+    """Compute pictures with random properties of board and room.
 
     Args:
-        antennas: of `PictureMaker`, with one map.
-        generator: of random numbers, on the maps' device.
+        antennas: the map `antennas` of `PictureMaker`.
+        generator: random number generator on the device of the maps.
     """
 
     def draw(low: float, high: float, *shape: int) -> Tensor:
@@ -68,12 +70,12 @@ def rough(antennas: Maps, generator: Generator) -> Float[Tensor, "item frame 1 r
 
 
 def uniform(generator: Generator, low: float, high: float, *shape: int) -> Tensor:
-    """Random numbers on the generator's device."""
+    """Draw uniform random numbers on the generator's device."""
     return low + (high - low) * torch.rand(shape, generator=generator, device=generator.device)
 
 
 def kept(level: Float[Tensor, "item frame row column"], generator: Generator) -> Maps:
-    """Pictures that keep a random share of their pixels: the share is of the newest, the threshold every one's."""
+    """Keep a random share of the pixels. The threshold follows from the newest frame and applies to all frames."""
     newest = (level[:, -1] - level[:, -1].amax(dim=(1, 2), keepdim=True)).flatten(1).sort(dim=1, descending=True).values
     share = uniform(generator, *KEPT, len(level), 1)
     threshold = newest.gather(1, (share * newest.shape[1]).long())[:, :, None, None]
@@ -81,12 +83,12 @@ def kept(level: Float[Tensor, "item frame row column"], generator: Generator) ->
 
 
 def antennas_of(maps: Maps) -> Heard:
-    """What antennas hear, of maps of `PictureMaker`."""
+    """Return complex antenna signals from the map `antennas` of `PictureMaker`."""
     return torch.view_as_complex(maps[:, :, 0].float().unflatten(3, (-1, 2)))
 
 
 def levels(heard: Heard) -> Float[Tensor, "item frame row column"]:
-    """What pictures are made of before anything is dropped: dB below the largest, `FLOOR` where no cell lies."""
+    """Compute polar pictures without a threshold, dB relative to the maximum; `FLOOR` in pixels without a cell."""
     spectrum = torch.fft.fft(heard, polar.COLUMNS, dim=3).transpose(2, 3)
     magnitude = torch.fft.fftshift(spectrum, dim=2).abs()
     largest = magnitude[..., polar.LEAKAGE :].amax(dim=(2, 3), keepdim=True).clamp_min(1e-30)
@@ -102,7 +104,8 @@ def levels(heard: Heard) -> Float[Tensor, "item frame row column"]:
 def picture(
     level: Float[Tensor, "item frame row column"], threshold: Float[Tensor, "item 1 1 1"]
 ) -> Float[Tensor, "item frame row column"]:
-    """0...255 from the least to the largest of what is at most `threshold` (dB) below the largest of its frame."""
+    """Scale levels to 0...255, from the least to the largest of those above `threshold` (dB relative to the
+    maximum)."""
     level = level - level.amax(dim=(2, 3), keepdim=True)
     kept = level >= threshold
     least = torch.where(kept, level, torch.zeros_like(level)).amin(dim=(2, 3), keepdim=True)
@@ -118,14 +121,14 @@ def _largest(heard: Heard) -> Float[Tensor, "item frame 1 1"]:
 
 
 def _dimmed(heard: Heard, ceiling: Float[Tensor, "item 1 1"]) -> Heard:
-    """Range bins of no more than so many dB re the largest: what is far below it keeps its level."""
+    """Limit the level of range bins softly, to a level in dB relative to the maximum."""
     power = heard.abs().square().mean(dim=3)
     most = _largest(heard)[..., 0].square() * 10 ** (ceiling / 10)
     return heard * (1 + power / most.clamp_min(1e-30)).rsqrt()[..., None]
 
 
 def _added(frames: int, draw: Draw, normal: Draw) -> Heard:
-    """Point echoes, re the largest, as antennas half a wavelength apart hear them over range without a window."""
+    """Simulate point echoes, relative to the maximum, at antennas half a wavelength apart, without a range window."""
     there = draw(0.0, 1.0, 1) > draw(0.0, 1.0, ADDED)
     strength = _amplitude(draw(*LEVELS, ADDED)) * there
     steps = torch.arange(frames, device=strength.device)[None, :, None]
@@ -140,7 +143,7 @@ def _added(frames: int, draw: Draw, normal: Draw) -> Heard:
 
 
 def _board(draw: Draw, normal: Draw) -> Complex64[Tensor, "item antenna"]:
-    """Gains and phases of antennas, and the mount's yaw."""
+    """Draw complex gains of the antennas, including the yaw of the mounting."""
     sine = draw(-YAW, YAW, 1)
     yaw = torch.pi * sine * torch.arange(4, device=sine.device)
     return torch.polar(_amplitude(GAIN * normal(4)), draw(0.0, PHASE, 1) * normal(4) + yaw)

@@ -1,4 +1,4 @@
-"""Scans by the network on polar pictures."""
+"""Scans by a network on polar pictures."""
 
 import numpy as np
 import torch
@@ -17,15 +17,15 @@ from radarize.signal.polar import azimuths
 
 
 class PictureStream:
-    """A network, and the windows of a stream's pictures that it sees: of those that a recording holds, or as samples
-    make them.
+    """A network with its input: windows of the pictures of a stream, from the recording or computed from samples.
 
     Args:
-        kind: of the network.
+        inputs: weights and radar.
+        kind: class of the network.
 
     Attributes:
         net: the network.
-        spacing: frames from one picture of a window to the next.
+        spacing: frames between the pictures of a window.
 
     Raises:
         InputError: no such weights, or they are for another radar.
@@ -37,12 +37,12 @@ class PictureStream:
         self.spacing = self._windows.spacings[0]
 
     def windows(self, batch: Batch) -> Shown:
-        """Of the next frames."""
+        """Return the windows that end at the next frames."""
         return self._windows.push({"picture": self._maker.of(batch)}, batch.stamps)[0]
 
 
 class PictureScans:
-    """Scans of a stream's frames.
+    """Scan extraction by `PictureNet` from a stream of frames.
 
     Raises:
         InputError: see `PictureStream`.
@@ -53,7 +53,7 @@ class PictureScans:
 
     @torch.inference_mode()
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""
+        """Estimate ranges on `radarize.signal.bearings.BEARINGS`, m; inf without a surface."""
         with stage("scans"):
             likely = self._stream.net.estimate(self._stream.windows(batch).maps)
             return on_bearings(first_surfaces(likely), BEARINGS)
@@ -62,7 +62,7 @@ class PictureScans:
 def on_bearings(
     ranges: Float[np.ndarray, "frame column"], bearings: Float[np.ndarray, "bearing"]
 ) -> Float[np.ndarray, "frame bearing"]:
-    """Ranges of the columns next to some bearings, rad."""
+    """Return the ranges (m) of the columns nearest to bearings (rad)."""
     return ranges[:, np.abs(azimuths(COLUMNS)[:, None] - bearings).argmin(axis=0)]
 
 

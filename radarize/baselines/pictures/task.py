@@ -1,4 +1,4 @@
-"""What trainings on pictures have in common: they read what pictures are made of, and their networks read pictures."""
+"""Base class of training tasks on pictures: they read antenna signals, from which augmented pictures are computed."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from radarize.radar.presets import PRESETS
 
 
 class PictureTask(Task[Tensor]):
-    """A task of a network that reads pictures, which are made anew in every step of its training."""
+    """Training task of a network on pictures, which are computed with new random properties in every step."""
 
     maps, reads = ("antennas",), ("picture",)
 
@@ -26,12 +26,12 @@ class PictureTask(Task[Tensor]):
         progress: Callable[..., None] = lambda *where: None,
         grid: MapGrid | None = None,
     ) -> FeatureTable:
-        """All that it reads of recordings. A grid (`train --start`) is that of the pictures, not of what they are made
-        of, and there is only one radar."""
+        """Read the antenna signals and labels of recordings. A grid (`train --start`) belongs to the pictures and is
+        not used, because all recordings are of one radar."""
         return super().table(paths, workers, progress)
 
     def header(self, settings: Settings, grid: MapGrid | None, **about: Any) -> Header:
-        """Of pictures, which come as often as what they are made of."""
+        """Return the header of the weights, with the grid of the pictures at the frame period of the recordings."""
         if grid is not None:
             picture = MapGrid.of(PRESETS["radarhd"], "picture", PictureMaker)
             grid = picture.model_copy(update={"frame_period": grid.frame_period})

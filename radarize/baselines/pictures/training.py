@@ -1,4 +1,4 @@
-"""Training on simulated walks: pictures roughened anew in every step, labels by the lidar beside the radar."""
+"""Training on simulated walks: pictures with random properties of board and room, labels by a simulated lidar."""
 
 from collections.abc import Iterable
 
@@ -12,7 +12,7 @@ from radarize.baselines.pictures.network import COLUMNS, PictureNet
 from radarize.baselines.pictures.points import points
 from radarize.baselines.pictures.roughening import uniform
 from radarize.baselines.pictures.task import PictureTask
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.learning.features.augment import chosen, mirrored
 from radarize.learning.features.table import Reading
 from radarize.learning.nets.weights import Network
@@ -20,21 +20,21 @@ from radarize.learning.task import Settings
 from radarize.signal import polar
 from radarize.signal.maps import Maps
 
-#: Choices for the probability from which on every cell has a point.
+#: Candidates for the probability above which every cell has a point.
 DENSE = (0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06)
-#: By how much rooms are larger or smaller, and columns of a picture by which they are turned, at most.
+#: Augmentation: maximum change of scale, and maximum rotation in columns of a picture.
 ZOOM, TURN = 0.25, 8
-#: m: the radar reads too far by range bias and lever arm of the data set's rig, on its training walks.
+#: Offset of the radar's ranges against the lidar's on the training walks, by range bias and lever arm of the rig, m.
 BIAS = (0.17, 0.34)
-#: Of cells of a label.
+#: Label of cells outside of the field of view.
 UNKNOWN = -1.0
 
 
 class Pictures(PictureTask):
-    """Points of a lidar from polar pictures; labels are its pictures, packed.
+    """Training task: a lidar's points from polar pictures; labels are packed pictures of the lidar.
 
     Attributes:
-        columns: that the network answers in.
+        columns: columns of the network's output.
     """
 
     network: type[Network] = PictureNet
@@ -61,7 +61,7 @@ class Pictures(PictureTask):
         return {"loss": loss, "chamfer_m": chamfer}
 
     def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Choose the probability from which on every cell has a point: the least mean Chamfer distance."""
+        """Choose the probability above which every cell has a point, by the least mean Chamfer distance."""
         least = net.get_buffer("dense")
         total = torch.zeros(len(DENSE), device=least.device)
         for maps, label in batches:
@@ -71,14 +71,14 @@ class Pictures(PictureTask):
 
 
 def chamfer(found: Bool[Tensor, "item row column"], label: Float[Tensor, "item row other"]) -> Float[Tensor, "item"]:
-    """Distance of points from a lidar's, m; half the reach of a picture where either has none."""
+    """Return Chamfer distances between estimated and true points, m; half the range of a picture if either is empty."""
     clouds = zip(found.cpu().numpy(), label.bool().cpu().numpy(), strict=True)
-    apart = np.nan_to_num([Apart.of_pictures(*each).chamfer for each in clouds], nan=polar.REACH / 2)
-    return torch.tensor(apart, dtype=torch.float32, device=label.device)
+    distances = np.nan_to_num([PointCloudDistance.of_pictures(*each).chamfer for each in clouds], nan=polar.REACH / 2)
+    return torch.tensor(distances, dtype=torch.float32, device=label.device)
 
 
 def validated(maps: Maps) -> Float[Tensor, "item frame 1 range column"]:
-    """The same roughening in every epoch, and the middle of the bias."""
+    """Compute validation pictures: the same random properties in every epoch, and the mean range offset."""
     seed = int(maps.abs().double().sum()) % 2**31
     pictures = roughening.rough(maps, Generator(maps.device).manual_seed(seed))
     return biased(pictures[:, :, 0], torch.full((len(maps),), sum(BIAS) / 2, device=maps.device))
@@ -87,7 +87,7 @@ def validated(maps: Maps) -> Float[Tensor, "item frame 1 range column"]:
 def elsewhere(
     pictures: Maps, label: Float[Tensor, "item row column"], generator: Generator
 ) -> tuple[Maps, Float[Tensor, "item row column"]]:
-    """Pictures and labels of other worlds: mirrored, larger or smaller, and turned."""
+    """Augment pictures and labels geometrically: mirrored, scaled and rotated."""
     left = chosen(pictures, generator)
     pictures = torch.where(left, mirrored(pictures), pictures)[:, :, 0]
     label = torch.where(left[:, 0, 0], label.flip(2), label)[:, None]
@@ -99,7 +99,7 @@ def elsewhere(
 
 
 def biased(pictures: Float[Tensor, "item frame row column"], metres: Float[Tensor, "item"]) -> Maps:
-    """Pictures that read so much too far."""
+    """Shift pictures in range by an offset in metres."""
     rows = (metres / polar.RANGES[1]).round().long()
     return _gathered(pictures, torch.arange(polar.ROWS, device=pictures.device) - rows[:, None])[:, :, None]
 
@@ -107,7 +107,7 @@ def biased(pictures: Float[Tensor, "item frame row column"], metres: Float[Tenso
 def zoomed(
     pictures: Float[Tensor, "item frame row column"], factor: Float[Tensor, "item"]
 ) -> Float[Tensor, "item frame row column"]:
-    """Of a world that is so much larger."""
+    """Scale pictures in range by a factor."""
     rows = torch.arange(polar.ROWS, device=pictures.device)
     return _gathered(pictures, (rows / factor[:, None]).round().long())
 
@@ -115,7 +115,7 @@ def zoomed(
 def rolled(
     pictures: Float[Tensor, "item frame row column"], columns: Int[Tensor, "item"], beyond: float
 ) -> Float[Tensor, "item frame row column"]:
-    """Of a world that is turned by so many columns; `beyond` is what nobody has seen."""
+    """Rotate pictures by a number of columns; `beyond` fills columns from outside of the field of view."""
     place = torch.arange(pictures.shape[3], device=pictures.device) - columns[:, None]
     inside = (place >= 0) & (place < pictures.shape[3])
     index = place.clamp(0, pictures.shape[3] - 1)[:, None, None].expand_as(pictures)
@@ -123,20 +123,21 @@ def rolled(
 
 
 def _gathered(pictures: Tensor, place: Int[Tensor, "item row"]) -> Tensor:
-    """Rows of pictures, 0 where there is none."""
+    """Gather rows of pictures; 0 for rows outside of them."""
     inside = (place >= 0) & (place < polar.ROWS)
     found = pictures.gather(2, place.clamp(0, polar.ROWS - 1)[:, None, :, None].expand_as(pictures))
     return found * inside[:, None, :, None]
 
 
 def unpacked(label: Tensor, columns: int = COLUMNS) -> Float[Tensor, "item row column"]:
-    """Pictures of a lidar on a network's columns: 1 where any of its beams has a point."""
+    """Unpack a lidar's pictures to a network's columns: 1 where any beam of a column has a point."""
     bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8, device=label.device)) & 1
     return bits.flatten(2).unflatten(2, (columns, -1)).amax(dim=3).float()
 
 
 def entropy(logits: Float[Tensor, "item 257 column"], label: Float[Tensor, "item row column"]) -> Float[Tensor, "item"]:
-    """Cross-entropy to the lidar's points of each known column, evenly, or to nothing."""
+    """Return the mean cross-entropy over known columns, with a uniform distribution over the points of a column, or on
+    no point."""
     known = label[:, 0] != UNKNOWN
     count = label.sum(dim=1)
     rows = (label * logits[:, :-1]).sum(dim=1) / count.clamp_min(1)

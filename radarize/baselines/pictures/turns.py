@@ -1,4 +1,4 @@
-"""Turns from polar pictures: a picture's columns are even in azimuth, so a turn shifts all of them alike."""
+"""Changes of yaw from polar pictures: columns are uniform in azimuth, so a rotation shifts all columns equally."""
 
 from collections.abc import Sequence
 
@@ -21,20 +21,20 @@ from radarize.learning.task import Motion, Settings, turns
 from radarize.signal import polar
 from radarize.signal.maps import Maps
 
-#: Columns by which pictures are shifted against each other: 34 deg to either side.
+#: Maximum shift between pictures, columns: 34 deg to either side.
 _SHIFTS = 12
 
 
 class PictureTurnNet(Network):
-    """Polar pictures to the change of yaw from the picture before the newest to the newest, rad, positive to the left.
+    """Network from polar pictures to the change of yaw between the two newest pictures, rad, positive to the left.
 
     Args:
-        frames: of a window.
-        maps: names of a frame's maps.
-        width: of the ResNet.
+        frames: frames of a window.
+        maps: names of the maps of a frame.
+        width: width of the ResNet.
 
     Attributes:
-        spread: logarithm of what standard deviations are multiplied with; training fits it.
+        spread: logarithm of a factor of the standard deviations; fitted after training.
     """
 
     kind, outputs = "picture-turns", ("turn", "covariance")
@@ -50,20 +50,20 @@ class PictureTurnNet(Network):
         self.register_buffer("spread", torch.zeros(()))
 
     def forward(self, maps: Maps) -> Gaussian:
-        """Turns of all windows."""
+        """Compute the distribution of the change of yaw of each window."""
         image = self.correlation(maps / 255)
         return Gaussian.of(self.resnet(torch.cat([image, coordinates(image)], dim=1)), 1)
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
-        """Mean and covariance, averaged over a window and its mirror image, whose turn is the other way."""
+        """Estimate mean and covariance, averaged over a window and its mirror image, whose change of yaw is negated."""
         found, mirrored = self(maps), self(augment.mirrored(maps))
         covariance = (found.covariance + mirrored.covariance) / 2 * (2 * self.spread).exp()
         return (found.mean - mirrored.mean) / 2, covariance
 
 
 class PictureTurns(PictureTask, Motion):
-    """Turn from the picture before the newest to the newest, rad. Pictures are as simulated, but for the share of them
-    that is kept: echoes that are added at random turn with nothing."""
+    """Training task: change of yaw between the two newest pictures, rad. Only the share of kept pixels is random,
+    because additional echoes would not rotate with the scene."""
 
     network, truth = PictureTurnNet, (YAW,)
     error, size = "rmse_rad", "rms_turn_rad"

@@ -1,2 +1,2 @@
-"""The paper's pipeline as its published artefact runs it, quirks included, so that its data's users get comparable
-numbers. `benchmarks/corrections.py` says what mending them is worth. It comes without weights."""
+"""The paper's pipeline as in its published artefact, known errors included, for results comparable with the paper's. It
+comes without weights."""

@@ -1,5 +1,5 @@
-"""Weights of the artefact's networks as `torch.save` leaves them (``transnet18.pth``, ``eca_rotnet18_135.pth``,
-``unet.pth``), read and written: layers have the same shapes, and other names.
+"""Conversion of the artefact's weights (``transnet18.pth``, ``eca_rotnet18_135.pth``, ``unet.pth``, by `torch.save`)
+from and to this package's: layers have the same shapes, but different names.
 
 | here | artefact |
 |---|---|
@@ -12,7 +12,7 @@
 | unet.up.L.grow, .mix | up(L + 1).up, up(L + 1).conv.double_conv |
 | unet.head | outc.conv, whose classes are occupied, free instead of free, occupied |
 
-All names of the translation network start with ``resnet18.`` there.
+In the artefact, all names of the translation network start with ``resnet18.``.
 """
 
 import re
@@ -40,7 +40,7 @@ _HEAD = {"0": "linear", "1": "fc.fcs.0", "3": "fc.fcs.2"}
 
 
 def artefact_name(kind: str, name: str) -> str | None:
-    """The artefact's name of a tensor of a network of that kind; None of one that it has not.
+    """Return the artefact's name of a tensor of a network; None if the artefact has no such tensor.
 
     Example:
         >>> artefact_name("rotation", "resnet.stages.0.1.body.5.mix.weight")
@@ -67,17 +67,17 @@ def artefact_name(kind: str, name: str) -> str | None:
 
 
 def _swapped(name: str, values: Tensor) -> Tensor:
-    """Classes of the U-Net's head in the other one's order."""
+    """Exchange the two classes of the U-Net's head, whose order differs."""
     return values.flip(0) if name.startswith("unet.head") else values
 
 
 def read_artefact(path: str | Path, kind: str, config: RadarConfig) -> tuple[Network, Header]:
-    """Read a network that the artefact trained.
+    """Read a network trained by the artefact.
 
     Args:
-        path: its ``.pth``.
+        path: file of weights, ``.pth``.
         kind: ``translation``, ``rotation`` or ``segmentation``.
-        config: of the radar whose maps it is to read.
+        config: radar configuration of the maps that the network will read.
 
     Raises:
         InputError: no such file, or not the weights of that network.
@@ -105,7 +105,7 @@ def read_artefact(path: str | Path, kind: str, config: RadarConfig) -> tuple[Net
 
 
 def import_artefact(source: str | Path, kind: str, config: RadarConfig, output: str | Path) -> Path:
-    """Write a network that the artefact trained as ``published-KIND.safetensors`` (float16) of this package.
+    """Convert a network trained by the artefact to this package's ``published-KIND.safetensors`` (float16).
 
     Example:
         >>> import_artefact("unet.pth", "segmentation", rz.load("walk.h5").config, "published-segmentation.safetensors")
@@ -114,13 +114,13 @@ def import_artefact(source: str | Path, kind: str, config: RadarConfig, output: 
 
 
 def export_artefact(source: str | Path, output: str | Path) -> Path:
-    """Write a network of ``published`` as a ``.pth`` that the artefact's own programs load.
+    """Convert a network of ``published`` to a ``.pth`` that the artefact's programs load.
 
     Args:
-        source: ``published-KIND.safetensors`` of width 64, as `radarize train published-KIND --width 64` leaves it.
+        source: ``published-KIND.safetensors`` of width 64, as written by `radarize train published-KIND --width 64`.
 
     Raises:
-        InputError: another network, or it cannot be written.
+        InputError: another network, or a file that cannot be written.
     """
     source, output = Path(source), Path(output)
     header = header_of(source)

@@ -1,4 +1,4 @@
-"""Labels as the published artefact makes them, from true poses and depth pictures."""
+"""Training labels as in the published artefact, from true poses and depth pictures."""
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8, UInt16
@@ -6,18 +6,18 @@ from scipy.spatial.transform import Rotation
 
 from radarize.io.recording import Recording
 
-#: Cells of scans: 4.51 cm where the radar's bins have 4.46 cm, and bearings (rad, ascending to the left) beside those
-#: of its maps.
+#: Cells of scans: 4.51 cm, while the radar's range bins are 4.46 cm; bearings (rad, ascending to the left), which
+#: differ from those of the maps.
 RANGES, BEARINGS = np.linspace(0.0, 4.284, 96), np.radians(np.linspace(-43.0, 43.0, 88))
-#: m, cells of occupancy labels end at the radar's maximum range with a speed of light of 3e8 m/s.
+#: Ranges of the cells of occupancy labels, up to the radar's maximum range with a speed of light of 3e8 m/s, m.
 LABEL_RANGES = np.linspace(0.0, 3e8 * 2285e3 / (2 * 80e12), 96)
-#: m, above and below the sensor's own plane, which is not levelled.
+#: Height above and below the sensor's plane within which points count, m; the plane is not levelled.
 SLAB = 0.03
 _BATCH = 64
 
 
 def velocity(recording: Recording, frames: slice) -> Float[np.ndarray, "frame 2"]:
-    """Displacement since the frame before over the time since then, in the sensor frame of then: forward, left, m/s.
+    """Return the mean velocity since the previous frame in the sensor frame at that time: forward, left, m/s.
 
     Raises:
         InputError: the recording has no true poses.
@@ -28,17 +28,17 @@ def velocity(recording: Recording, frames: slice) -> Float[np.ndarray, "frame 2"
 def finite_difference(
     pose: Float[np.ndarray, "frame 7"], times: Float[np.ndarray, "frame"]
 ) -> Float[np.ndarray, "frame 2"]:
-    """See `velocity`; the first frame, which has none before, gets the second's."""
+    """Compute `velocity` from poses and times (s); the first frame gets the value of the second."""
     moved = Rotation.from_quat(pose[:-1, 3:]).inv().apply(np.diff(pose[:, :3], axis=0))
     speed = (moved / np.diff(times)[:, None])[:, :2]
     return np.concatenate([speed[:1], speed])
 
 
 def occupancy(recording: Recording, frames: slice) -> UInt8[np.ndarray, "frame range bearing"]:
-    """Whether cells hold a point of the depth picture; radar frame i is paired with picture i + 1.
+    """Return occupancy of range-bearing cells by the depth picture; radar frame i is paired with picture i + 1.
 
     Raises:
-        InputError: the recording has no depth pictures or does not say through which lens.
+        InputError: the recording has no depth pictures, or no intrinsics of the depth camera.
     """
     pinhole = recording.read("truth/depth_intrinsics")
     pictures = np.minimum(np.arange(len(recording))[frames] + 1, len(recording) - 1)
@@ -54,12 +54,12 @@ def occupancy(recording: Recording, frames: slice) -> UInt8[np.ndarray, "frame r
 def occupied(
     depth: UInt16[np.ndarray, "frame row column"], pinhole: Float[np.ndarray, "4"]
 ) -> Bool[np.ndarray, "frame range bearing"]:
-    """Cells with a point in the camera's plane, and their neighbours one farther and one to the left.
+    """Return cells with a point in the camera's plane, and their neighbours one farther and one to the left.
 
     Points whose nearest cell is the first or last of its row or column are left out.
 
     Args:
-        depth: along the optical axis, mm, 0 where there is none.
+        depth: distance along the optical axis, mm; 0 where unknown.
         pinhole: fx, fy, cx, cy, pixels.
     """
     fx, fy, cx, cy = pinhole

@@ -1,4 +1,4 @@
-"""The methods, put together."""
+"""Odometry and scans of the published artefact as methods of the pipeline."""
 
 import numpy as np
 from jaxtyping import Float
@@ -19,7 +19,7 @@ from radarize.pipeline.method import Inputs, Method
 
 
 def odometry(inputs: Inputs) -> PublishedOdometry:
-    """Like the artefact, from true headings where the recording has them."""
+    """Make the artefact's odometry, which starts from true headings if the recording has them."""
     return PublishedOdometry(
         PublishedStream(inputs.radar), _load(inputs, PublishedTranslationNet), _load(inputs, PublishedRotationNet),
         _headings(inputs),
@@ -27,7 +27,7 @@ def odometry(inputs: Inputs) -> PublishedOdometry:
 
 
 def scans(inputs: Inputs) -> PublishedScans:
-    """By the artefact's segmentation."""
+    """Make the artefact's scan extraction by segmentation."""
     return PublishedScans(PublishedStream(inputs.radar), _load(inputs, PublishedSegmentationNet))
 
 
@@ -44,7 +44,7 @@ def _load(inputs: Inputs, network: type[Network]) -> Network:
 
 
 def _headings(inputs: Inputs) -> Float[np.ndarray, "4"] | None:
-    """True yaws of the first frames that are used."""
+    """Return the true yaws of the first frames that are used; None if unknown."""
     source = inputs.recording
     if source is None or not source.has("truth/pose"):
         return None

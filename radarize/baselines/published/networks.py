@@ -1,7 +1,7 @@
-"""The artefact's networks: what it adds to ResNet18 and U-Net.
+"""The artefact's networks, based on ResNet18 and U-Net.
 
-They see maps of 0...1 as they are, newest frame last, and answer with a number, not a distribution. `estimate` gives a
-covariance all the same, the same for every item: the error on validation data, for what comes after them.
+They read maps of 0...1, newest frame last, and return values without a distribution. `estimate` adds a constant
+covariance, the mean squared error on validation data, for the back end.
 """
 
 import math
@@ -19,8 +19,8 @@ from radarize.signal.maps import Maps
 
 
 class Attention(nn.Module):
-    """Efficient channel attention: channels weighed by what an image's mean says of them and their neighbours (Wang et
-    al., "ECA-Net: efficient channel attention for deep convolutional neural networks", 2020, equation 12)."""
+    """Efficient channel attention: channels are weighted by a convolution over the channels' means (Wang et al.,
+    "ECA-Net: efficient channel attention for deep convolutional neural networks", 2020, equation 12)."""
 
     def __init__(self, channels: int):
         super().__init__()
@@ -34,10 +34,10 @@ class Attention(nn.Module):
 
 
 class PublishedMotionNet(Network):
-    """What the two have in common.
+    """Base class of the networks for translation and rotation.
 
     Attributes:
-        kind, dimensions, pool: set by the subclass; the last as of `ResNet18`.
+        kind, dimensions, pool: kind of network, number of outputs, and option of `ResNet18`; set by the subclass.
         error: mean squared error on validation data.
     """
 
@@ -55,18 +55,19 @@ class PublishedMotionNet(Network):
         return self.resnet(maps.flatten(1, 2))
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item dimension"], Float[Tensor, "item dimension dimension"]]:
-        """Value and covariance."""
+        """Return the estimate and its covariance."""
         return self(maps), torch.diag(self.error).expand(maps.shape[0], -1, -1)
 
 
 class PublishedTranslationNet(PublishedMotionNet):
-    """Doppler-azimuth maps of both arrays to the velocity (forward, left), m/s, since the frame before."""
+    """Network from Doppler-azimuth maps of both arrays to the mean velocity (forward, left) since the last frame,
+    m/s."""
 
     kind, dimensions, pool = "translation", 2, True
 
 
 class PublishedRotationNet(PublishedMotionNet):
-    """Range-azimuth maps of one, three and five frames, at two instants, to the turn between them, rad."""
+    """Network from range-azimuth maps over 1, 3 and 5 frames, at two times, to the change of yaw between them, rad."""
 
     kind, dimensions, pool = "rotation", 1, False
 
@@ -80,17 +81,19 @@ class PublishedRotationNet(PublishedMotionNet):
         self.resnet.head = nn.Sequential(nn.Linear(8 * width, 32), nn.Linear(32, 256), nn.ReLU(), nn.Linear(256, 1))
 
     def forward(self, maps: Maps) -> Float[Tensor, "item 1"]:
-        """Of frames a, b and their maps 1, 3, 5: the channels are a1, a3, a5, b5, b3, b1, which time reverses."""
+        """Estimate the change of yaw between frames a and b with maps 1, 3, 5. Channels are a1, a3, a5, b5, b3, b1,
+        whose order time reversal inverts."""
         return self.resnet(torch.cat([maps[:, 0], maps[:, 1].flip(1)], dim=1))
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
-        """Turn, the mean of forward and, negated, reverse; and its covariance."""
+        """Return the change of yaw, the mean of the estimate and the negated estimate in reversed time; its
+        covariance."""
         turn = (self(maps) - self(maps.flip(1))) / 2
         return turn, torch.diag(self.error).expand(maps.shape[0], -1, -1)
 
 
 class PublishedSegmentationNet(Network):
-    """Range-azimuth maps of one, three and five frames of both arrays to occupancy, of two classes."""
+    """Network from range-azimuth maps of both arrays over 1, 3 and 5 frames to occupancy, in two classes."""
 
     kind, setting, maker, outputs = "segmentation", "published", PublishedMaps, ("probability",)
 
@@ -99,9 +102,9 @@ class PublishedSegmentationNet(Network):
         self.unet = UNet(frames * len(self.maps), 2, width)
 
     def forward(self, maps: Maps) -> Float[Tensor, "item class range bearing"]:
-        """Logits of free (0) and occupied (1) cells."""
+        """Compute logits of free (0) and occupied (1) cells."""
         return self.unet(maps.flatten(1, 2))
 
     def estimate(self, maps: Maps) -> Float[Tensor, "item range bearing"]:
-        """Probability that a cell is occupied."""
+        """Estimate the probability that a cell is occupied."""
         return self(maps).softmax(dim=1)[:, 1]

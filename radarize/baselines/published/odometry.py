@@ -1,4 +1,4 @@
-"""From raw frames to a path as the published artefact does it."""
+"""Odometry of the published artefact."""
 
 import numpy as np
 import torch
@@ -12,21 +12,21 @@ from radarize.odometry.integration import Track
 from radarize.odometry.uncertainty import ErrorModel
 from radarize.signal.batch import Batch
 
-#: Frames of 15 Hz over which turns are told, and so interleaved chains of yaws.
+#: Frames of 15 Hz over which changes of yaw are estimated: the number of interleaved chains of yaws.
 CHAINS = 4
 
 
 class PublishedOdometry:
-    """Odometry of those frames that the artefact uses.
+    """Odometry at the frames that the artefact uses.
 
-    Velocities are integrated by Euler's rule with the heading before; yaws come in four interleaved chains, each
-    turning by what the network says of four frames.
+    Velocities are integrated by Euler's rule with the previous heading. Yaws form four interleaved chains, each
+    integrating the network's changes of yaw over four frames.
 
     Args:
-        stream: makes the maps.
-        translation, rotation: trained networks, and what they read.
-        headings: true yaws of the first four frames that are used, rad, from which the artefact's chains start; zeros
-            if None, as far as a radar alone can know.
+        stream: computes the maps.
+        translation, rotation: trained networks.
+        headings: true yaws of the first four frames that are used, from which the artefact's chains start, rad; zeros
+            if None, because a radar cannot observe them.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class PublishedOdometry:
 
     @torch.inference_mode()
     def update(self, batch: Batch) -> Track:
-        """Poses of those of the next frames that are used; there may be none."""
+        """Estimate poses at those of the next frames that are used; there may be none."""
         used, made = self._stream.maps(batch)
         if not len(used):
             none = np.zeros((0, 3))
@@ -61,14 +61,14 @@ class PublishedOdometry:
         times: Float[np.ndarray, "used"],
         velocities: Float[torch.Tensor, "used 2"],
         velocity_noise: Float[torch.Tensor, "used 2 2"],
-        turns: Float[torch.Tensor, "told 1"],
-        turn_noise: Float[torch.Tensor, "told ..."],
+        turns: Float[torch.Tensor, "pair 1"],
+        turn_noise: Float[torch.Tensor, "pair ..."],
         maps: Float[torch.Tensor, "used map row azimuth"],
     ) -> Track:
-        """Poses from velocities since the frame before and turns since four frames before."""
+        """Integrate velocities since the previous frame and changes of yaw over four frames to poses."""
         velocity, turn = velocities.double().numpy(), turns[:, 0].double().numpy()
         poses, steps, spreads = np.zeros((len(times), 3)), np.zeros((len(times), 3)), np.zeros((len(times), 3, 3))
-        late = len(times) - len(turn)  # frames of this batch that have none four before them
+        late = len(times) - len(turn)  # frames of this batch without a frame four before them
         for i, time in enumerate(times):
             if i < late:
                 poses[i, 2] = self._start[len(self._past)]
@@ -86,7 +86,7 @@ class PublishedOdometry:
 
 
 def window(net: Network, made: dict[str, Float[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
-    """What a network reads of frames: (frame, map, row, azimuth)."""
+    """Stack the maps that a network reads: (frame, map, row, azimuth)."""
     return torch.stack([torch.from_numpy(made[name]).float() for name in net.maps], dim=1)
 
 
@@ -98,7 +98,7 @@ def _track(
     velocity: Float[np.ndarray, "used 2"],
     velocity_spread: Float[np.ndarray, "used 2 2"],
 ) -> Track:
-    """The artefact always takes velocity and turn for seen, and steps for independent."""
+    """Make a track. As in the artefact, velocity and yaw rate always count as observed, and errors as independent."""
     velocity_seen, turn_seen = np.ones((2, len(times)), bool)
     errors = ErrorModel.independent(spreads)
     return Track(times, poses, steps, velocity, velocity_spread, velocity_seen, turn_seen, errors)

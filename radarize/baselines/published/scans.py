@@ -1,4 +1,4 @@
-"""Scans as the published artefact makes them: the first occupied cell of each bearing."""
+"""Scans as in the published artefact: the first occupied cell of each bearing."""
 
 import numpy as np
 import torch
@@ -17,14 +17,14 @@ _COLUMNS = np.abs(BEARINGS[:, None] - labels.BEARINGS).argmin(axis=1)
 
 
 class PublishedScans:
-    """Scans of those frames that the artefact uses; the others see nothing."""
+    """Scan extraction at the frames that the artefact uses; scans of the other frames are empty."""
 
     def __init__(self, stream: PublishedStream, segmentation: Network):
         self._stream, self._net = stream, segmentation
 
     @torch.inference_mode()
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""
+        """Estimate ranges on `radarize.signal.bearings.BEARINGS`, m; inf without a surface."""
         used, made = self._stream.maps(batch)
         ranges = np.full((len(batch), len(BEARINGS)), np.inf)
         if len(used):
@@ -34,6 +34,6 @@ class PublishedScans:
 
 
 def first_occupied(likely: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame bearing"]:
-    """Range of the first cell that is occupied rather than free per bearing of a scan, m, inf where there is none."""
+    """Return the range of the first cell with an occupancy above 0.5 on each bearing, m; inf without such a cell."""
     cells = likely[:, :, _COLUMNS] > 0.5
     return np.where(cells.any(axis=1), labels.RANGES[cells.argmax(axis=1)], np.inf)

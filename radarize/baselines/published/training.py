@@ -1,5 +1,4 @@
-"""The artefact's trainings, where they differ from Radarize's own: plain errors instead of likelihoods, its labels, its
-augmentations."""
+"""Training tasks of the artefact: squared errors instead of likelihoods, its labels and augmentations."""
 
 import math
 from collections.abc import Iterable
@@ -24,30 +23,31 @@ from radarize.signal.maps import Maps
 
 
 class Plain(Motion):
-    """Networks without uncertainty, judged by their squared errors."""
+    """Base class of tasks of networks without uncertainty, evaluated by their squared errors."""
 
     steepest = math.inf
 
     def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Keep the validation error as everyone's."""
+        """Set the covariance of all estimates to the mean squared validation error."""
         squared = torch.cat([(net.estimate(maps)[0] - label).square() for maps, label in batches])
         net.get_buffer("error").copy_(squared.mean(dim=0).clamp_min(1e-6))
 
 
 class PublishedTranslation(Plain):
-    """Velocity since the frame before, m/s."""
+    """Training task: mean velocity since the previous frame, m/s."""
 
     network, error, size = PublishedTranslationNet, Translation.error, Translation.size
     maps, truth = tuple(DOPPLER), (Reading("published_velocity", "truth/pose", labels.velocity),)
     defaults = Settings(width=64, frames=1, patience=30)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        """Half of the items go backwards. Zero Doppler is the lower edge of row 30 of 60, which becomes row 29."""
+        """Reverse the velocity of half of the items. Zero Doppler is the lower edge of row 30 of 60, which becomes row
+        29."""
         back = augment.chosen(maps, generator)
         return torch.where(back, maps.flip(3), maps), torch.where(back.flatten(1), -label, label)
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        """Root of the batch's mean squared error, the same for all its items."""
+        """Return the root mean squared error of the batch, for each of its items."""
         return (net(maps) - label).square().mean().sqrt().expand(len(maps))
 
     def judge(self, net: Network, maps: Maps, label: Tensor) -> Tensor:
@@ -61,7 +61,7 @@ class PublishedTranslation(Plain):
 
 
 class PublishedRotation(Plain):
-    """Turn over one to four frames of 15 Hz, rad."""
+    """Training task: change of yaw over one to four frames of 15 Hz, rad."""
 
     network, error, size, reach = PublishedRotationNet, Rotation.error, Rotation.size, Rotation.reach
     maps, truth = tuple(RANGE), (YAW,)
@@ -73,12 +73,12 @@ class PublishedRotation(Plain):
         return turns(table, frames)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        """Half of the items are swapped in time; none are mirrored."""
+        """Reverse half of the items in time; none are mirrored."""
         back = augment.chosen(maps, generator)
         return torch.where(back, maps.flip(1), maps), torch.where(back.flatten(1), -label, label)
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        """Squared errors there and back."""
+        """Return the sum of squared errors forward and in reversed time."""
         forth, back = net(torch.cat([maps, maps.flip(1)])).chunk(2)
         return ((label - forth).square() + (-label - back).square()).squeeze(1)
 
@@ -90,14 +90,14 @@ class PublishedRotation(Plain):
 
 
 class PublishedSegmentation(Segmentation):
-    """Occupancy of the depth picture's slab."""
+    """Training task: occupancy by the depth picture, near the sensor's plane."""
 
     network, steepest = PublishedSegmentationNet, math.inf
     maps, truth = (*RANGE, *LEVEL), (Reading("published_occupancy", "truth/depth", labels.occupancy),)
     defaults = Settings(width=64, frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        """Half of the items are mirrored, column by column, though neither grid is symmetric to the other."""
+        """Mirror half of the items, column by column, as in the artefact, though the grids are not symmetric."""
         left = augment.chosen(maps, generator)
         return torch.where(left, maps.flip(4), maps), torch.where(left[:, :, 0, 0], label.flip(2), label)
 
@@ -110,14 +110,14 @@ class PublishedSegmentation(Segmentation):
         return self._judged(loss, logits.argmax(dim=1) == 1, label == 1)
 
     def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Its probabilities are taken as they are."""
+        """Do nothing: probabilities are used as they are."""
 
 
 def pooled_dice(
     logits: Float[Tensor, "item 2 range bearing"], label: UInt8[Tensor, "item range bearing"]
 ) -> Float[Tensor, ""]:
-    """Dice loss with sums over items and both classes, in which it is 1 - mean probability of the true class: cells
-    count alike, and of a hundred one is occupied."""
+    """Return the Dice loss with sums over items and both classes, which equals 1 - mean probability of the true class.
+    All cells have the same weight, though only 1 % of them are occupied."""
     truth = torch.stack([label == 0, label == 1], dim=1).float()
     likely = logits.softmax(dim=1)
     return 1 - 2 * (likely * truth).sum() / (likely.sum() + truth.sum())

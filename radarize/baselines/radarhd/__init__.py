@@ -1,1 +1,1 @@
-"""RadarHD (Prabhakara et al., ICRA 2023): pictures like a lidar's."""
+"""RadarHD (Prabhakara et al., ICRA 2023): a network that estimates a lidar's pictures from a radar's."""

@@ -1,4 +1,4 @@
-"""RadarHD: a U-Net that draws, from two seconds of a radar's range-azimuth maps, what a lidar would have seen.
+"""RadarHD: a U-Net from two seconds of a radar's range-azimuth maps to the picture of a lidar.
 
 Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023.
 """
@@ -19,20 +19,20 @@ from radarize.learning.nets.weights import Network
 from radarize.signal.bearings import BEARINGS
 from radarize.signal.maps import AZIMUTHS, Maps
 
-#: Columns that the network sees, and those of its picture, over the field of the scans.
+#: Azimuth columns of the network's input and of its output, over the field of view of the scans.
 SEEN, DRAWN = 64, 512
 _DOUBLINGS = (DRAWN // SEEN).bit_length() - 1
-#: Edges of the picture, rad: those of the scans' outer bearings.
+#: Edges of the picture, rad: the outer edges of the scans' first and last bearing.
 _HALF = (BEARINGS[1] - BEARINGS[0]) / 2
 FIELD = (float(BEARINGS[0] - _HALF), float(BEARINGS[-1] + _HALF))
-#: Rows in which the transmitters leak into the receivers.
+#: Range rows with leakage of the transmitters.
 _LEAKAGE = 6
-#: dB below a frame's maximum from which cells are dropped: 5 % of its magnitude.
+#: Level below a frame's maximum under which cells are dropped, dB: 5 % of its magnitude.
 _DEPTH = -20 * np.log10(0.05)
 
 
 def columns(count: int) -> Float[np.ndarray, "count"]:
-    """Middles of equal columns of the field, rad, positive to the left, ascending."""
+    """Return the centres of equal columns of the field of view, rad, positive to the left, ascending."""
     edges = np.linspace(*FIELD, count + 1)
     return (edges[1:] + edges[:-1]) / 2
 
@@ -42,11 +42,11 @@ def _larger(*scale: float) -> nn.Upsample:
 
 
 class DrawingNet(Network):
-    """Range-azimuth maps to a picture of eight times as many columns.
+    """Network from range-azimuth maps to a picture of eight times as many columns.
 
     Args:
-        frames: of a window, oldest first; 41 in the original.
-        maps: names of a frame's maps: one.
+        frames: frames of a window, oldest first; 41 in the original.
+        maps: name of the map of a frame.
         width: channels of the first level; 64 in the original, with 17.51 M parameters.
     """
 
@@ -66,30 +66,30 @@ class DrawingNet(Network):
         self.sharpen = nn.Sequential(*map(nn.Sequential, sharper))
         self.head = nn.Conv2d(width, 1, 1)
         self.coarse = False  # whether training rounds convolutions to bfloat16, see `ResNet18`
-        #: Probability from which a cell counts as a surface; training fits it on validation data.
+        #: Probability above which a cell counts as a surface; fitted on validation data.
         self.register_buffer("least", torch.tensor(0.5))
 
     @abstractmethod
     def seen(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
-        """The frames as the network sees them, 0...1."""
+        """Return the network's input, 0...1."""
 
     def forward(self, maps: Maps) -> Float[Tensor, "item range direction"]:
-        """Logits of a surface in a cell of range and of `DRAWN` columns."""
+        """Compute logits of a surface in each cell of range and `DRAWN` columns."""
         x = self.seen(maps)
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.coarse and self.training):
             x = self.sharpen(through(x, self.down, self.up))
         return self.head(x.float())[:, 0]
 
     def estimate(self, maps: Maps) -> Float[Tensor, "item range direction"]:
-        """Probability of the same."""
+        """Estimate the probability of a surface in each cell."""
         return torch.sigmoid(self(maps))
 
 
 class RadarHdNet(DrawingNet):
-    """Capon's maps to a picture of the first surfaces on `columns(DRAWN)`.
+    """Network from Capon's range-azimuth maps to a picture of the first surfaces on `columns(DRAWN)`.
 
-    The original sees 256 ranges, 64 directions of half a circle and a Bartlett beamformer's magnitudes; this one sees
-    the ranges of the radar, the field of its scans, and the map of Capon's beamformer that all networks share.
+    The original reads 256 ranges, 64 directions over half a circle and magnitudes of Bartlett's beamformer. This one
+    reads the radar's ranges, the field of view of the scans, and the map of Capon's beamformer used by all networks.
     """
 
     kind = "radarhd"
@@ -101,18 +101,18 @@ class RadarHdNet(DrawingNet):
         self.register_buffer("resampling", torch.tensor(resampling, dtype=torch.float32), persistent=False)
 
     def seen(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
-        """The strongest 26 dB of each frame as 0...1, without leakage."""
+        """Scale the upper 26 dB of each frame to 0...1, without leakage."""
         image = (maps @ self.resampling).flatten(1, 2)[:, :, _LEAKAGE:]
         image = (1 + (image - image.amax(dim=(2, 3), keepdim=True)) / _DEPTH).clamp_min(0)
         return pad(image, (0, 0, _LEAKAGE, 0))
 
 
 class RadarHdPictureNet(DrawingNet):
-    """RadarHD's own pictures (`radarize.signal.polar`) to those of its lidar, both of half a circle: columns are
-    `AZIMUTHS` and, as doubling them leaves the outer ones where they are, `BEAM_AZIMUTHS`."""
+    """Network from RadarHD's pictures (`radarize.signal.polar`) to those of its lidar, both over half a circle. Columns
+    are `AZIMUTHS` and `BEAM_AZIMUTHS`, because upsampling keeps the outer columns in place."""
 
     kind, maker = "radarhd-pictures", PictureMaker
 
     def seen(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
-        """Pictures are scaled and without leakage already."""
+        """Scale pictures from 0...255 to 0...1; they have no leakage."""
         return maps.flatten(1, 2) / 255

@@ -1,4 +1,4 @@
-"""RadarHD's network on its own pictures, trained on the simulated walks of `radarize.baselines.pictures`."""
+"""RadarHD's network on RadarHD's pictures, trained on the simulated walks of `radarize.baselines.pictures`."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -14,16 +14,16 @@ from radarize.learning.nets.weights import Network
 from radarize.learning.task import Settings
 from radarize.signal.maps import Maps
 
-#: Choices for the probability from which a cell is a point; one cell in 150 holds any.
+#: Candidates for the probability above which a cell is a point; one cell in 150 has a point.
 LEAST = torch.tensor([0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6])
 
 
 class RadarHdPictures(Pictures):
-    """Pictures of a lidar from a radar's, as the paper has it: its network, loss, optimiser and rule for points, and
-    two seconds of the past. What is seen is what our own network sees, roughened, mirrored, zoomed, turned and biased
-    alike, so that only the method differs.
+    """Training task: a lidar's pictures from a radar's, with the network, loss, optimiser and rule for points of the
+    paper, and two seconds of history. Data and augmentation are those of our own network, so that only the method
+    differs.
 
-    The original sees 41 pictures 0.05 s apart; this one 11, for the walks have one every 0.2 s.
+    The original reads 41 pictures 0.05 s apart; this one reads 11, because the walks have a picture every 0.2 s.
     """
 
     network, columns = RadarHdPictureNet, DRAWN
@@ -40,7 +40,7 @@ class RadarHdPictures(Pictures):
         return torch.stack([known(logits, label), chamfer(found, label)], dim=1)
 
     def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Choose the probability from which a cell is a point: the least mean Chamfer distance."""
+        """Choose the probability above which a cell is a point, by the least mean Chamfer distance."""
         total = torch.zeros(len(LEAST))
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label, DRAWN)
@@ -51,5 +51,5 @@ class RadarHdPictures(Pictures):
 def known(
     logits: Float[Tensor, "item range column"], label: Float[Tensor, "item range column"]
 ) -> Float[Tensor, "item"]:
-    """The paper's loss where columns are known: elsewhere the network is taken to be right."""
+    """Return the paper's loss on known columns; unknown columns count as correct."""
     return unlike(logits.masked_fill(label < 0, -20.0), label.clamp_min(0))

@@ -1,4 +1,4 @@
-"""Scans by RadarHD: of the picture that it draws, the first surface on each bearing."""
+"""Scans by RadarHD: the first surface on each bearing of the network's picture."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from radarize.signal.bearings import BEARINGS
 
 
 class RadarHdScans:
-    """Scans of a stream's frames.
+    """Scan extraction by RadarHD from a stream of frames.
 
     Raises:
         InputError: no such weights, or they are for another radar.
@@ -30,13 +30,13 @@ class RadarHdScans:
 
     @torch.inference_mode()
     def picture(self, batch: Batch) -> Float[torch.Tensor, "frame range direction"]:
-        """Probability of a surface in cells of range and `radarize.baselines.radarhd.network.columns(DRAWN)`."""
+        """Estimate the probability of a surface in cells of range and `columns(DRAWN)` of the network's module."""
         shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
-        # One by one: a window has 41 maps.
+        # One by one to save memory: a window has 41 maps.
         return torch.cat([self._net.estimate(window[None]) for window in shown.maps])
 
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""
+        """Estimate ranges on `radarize.signal.bearings.BEARINGS`, m; inf without a surface."""
         with stage("scans"):
             likely = adaptive_max_pool2d(self.picture(batch), (len(self._ranges), len(BEARINGS))).numpy()
             bins = echoes.first(likely > float(self._net.least), likely)
@@ -44,7 +44,7 @@ class RadarHdScans:
 
 
 def scans(inputs: Inputs) -> RadarHdScans:
-    """By the inputs' weights."""
+    """Make scan extraction with the weights of the inputs."""
     return RadarHdScans(inputs.radar, inputs.weights.of("radarhd"))
 
 

@@ -1,4 +1,4 @@
-"""RadarHD's training: its paper's loss, augmentation and hyper-parameters, but for the width."""
+"""Training of RadarHD with its paper's loss, augmentation and hyper-parameters, except the width."""
 
 from collections.abc import Iterable
 
@@ -20,7 +20,7 @@ from radarize.signal.maps import Maps
 
 
 def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearing"]:
-    """What training draws its pictures from: range bins of the true scan, fractional, -1 where nothing is in reach."""
+    """Return fractional range bins of the true scan, from which label pictures are drawn; -1 without a surface."""
     config = recording.config
     found = (recording.read("truth/scan")[frames] + config.range_bias) / config.range_resolution
     return np.where(np.isinf(found), -1, found).astype(np.float32)
@@ -29,22 +29,22 @@ def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearin
 def on_grid(
     label: Float[np.ndarray, "frame bearing"], own: MapGrid, known: MapGrid
 ) -> Float[np.ndarray, "frame bearing"]:
-    """Range bins of one radar as those of a grid, -1 beyond its last one."""
+    """Convert range bins of one radar to those of a grid; -1 beyond its last bin."""
     found = label * np.float32(own.step / known.step)
     return np.where((label < 0) | (found > known.rows - 0.5), np.float32(-1), found)
 
 
 class RadarHd(Task[Tensor]):
-    """Pictures of first surfaces, drawn from the true scan: the lidar of the original.
+    """Training task: pictures of first surfaces, drawn from the true scan in place of the original's lidar.
 
-    Labels are scans in range bins, -1 where nothing is in reach.
+    Labels are scans in range bins, -1 without a surface in range.
     """
 
     network, maps = RadarHdNet, ("range_azimuth",)
     truth = (Reading("scan", "truth/scan", bins, on_grid),)
     defaults = Settings(frames=41, epochs=120, batch=6, rate=1e-4)
     share = 1 / 20
-    #: Cells of range by which a first surface may be off to count as found: 9 cm.
+    #: Maximum range error of a detected first surface, cells: 9 cm.
     near = 2
 
     def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
@@ -65,35 +65,35 @@ class RadarHd(Task[Tensor]):
         )
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
-        loss, near, told, there = means.tolist()
+        loss, near, returned, there = means.tolist()
         return {
             "loss": loss,
             "share_found_within_9_cm": near / max(there, 1e-9),
-            "share_right_of_returned": near / max(told, 1e-9),
+            "share_right_of_returned": near / max(returned, 1e-9),
         }
 
     def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Choose the probability from which the first cell on a bearing is returned: the best F1 of returned ranges."""
+        """Choose the probability above which the first cell on a bearing is returned, by the best F1 of ranges."""
         choices = torch.arange(0.1, 0.95, 0.05)
         counts = torch.zeros(len(choices), 3)
         for maps, label in batches:
             logits = net(maps)
             counts += torch.stack([self._counts(logits, label, least).sum(dim=0).cpu() for least in choices])
-        near, told, there = counts.T
-        net.get_buffer("least").fill_(choices[(2 * near / (told + there).clamp_min(1)).argmax()])
+        near, returned, there = counts.T
+        net.get_buffer("least").fill_(choices[(2 * near / (returned + there).clamp_min(1)).argmax()])
 
     def _counts(self, logits: Tensor, label: Tensor, least: Tensor) -> Int[Tensor, "item 3"]:
-        """Bearings with a range that is right, with any, and that should have one."""
+        """Count bearings with a correct range, with any range, and with a surface in range."""
         rows, bearings = logits.shape[1], len(BEARINGS)
         found = first_cell(adaptive_max_pool2d(logits, (rows, bearings)) > torch.logit(least))
-        told, there = found < rows, label >= 0
-        near = told & there & ((found - label).abs() <= self.near + 0.5)
-        return torch.stack([near.sum(dim=1), told.sum(dim=1), there.sum(dim=1)], dim=1)
+        returned, there = found < rows, label >= 0
+        near = returned & there & ((found - label).abs() <= self.near + 0.5)
+        return torch.stack([near.sum(dim=1), returned.sum(dim=1), there.sum(dim=1)], dim=1)
 
 
 def drawn(label: Float[Tensor, "item bearing"], rows: int) -> Float[Tensor, "item range direction"]:
-    """Pictures of scans: in every column 1 in the cell of the nearest bearing's range bin, or, where two neighbouring
-    bearings see the same surface, of what lies between them."""
+    """Draw pictures of scans: in every column 1 in the range bin of the nearest bearing, or an interpolated range bin
+    where two neighbouring bearings see the same surface."""
     place = (columns(DRAWN) - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])
     place = torch.tensor(np.clip(place, 0, len(BEARINGS) - 1), dtype=torch.float32, device=label.device)
     before = place.long().clamp_max(len(BEARINGS) - 2)
@@ -106,14 +106,14 @@ def drawn(label: Float[Tensor, "item bearing"], rows: int) -> Float[Tensor, "ite
 def pictured(
     logits: Float[Tensor, "item range direction"], label: Float[Tensor, "item bearing"]
 ) -> Float[Tensor, "item"]:
-    """How far pictures are from scans in range bins."""
+    """Return the loss of pictures against scans in range bins."""
     return unlike(logits, drawn(label, logits.shape[1]))
 
 
 def unlike(
     logits: Float[Tensor, "item range direction"], truth: Float[Tensor, "item range direction"]
 ) -> Float[Tensor, "item"]:
-    """0.9 cross-entropy and 0.1 Dice of pictures."""
+    """Return the loss of pictures: 0.9 cross-entropy + 0.1 Dice loss."""
     likely = torch.sigmoid(logits)
     entropy = binary_cross_entropy_with_logits(logits, truth, reduction="none").mean(dim=(1, 2))
     shared, total = (likely * truth).sum(dim=(1, 2)), (likely + truth).sum(dim=(1, 2))

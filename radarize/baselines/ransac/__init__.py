@@ -1,1 +1,1 @@
-"""Doppler RANSAC over sparse points (Doer and Trommer, REVE, 2020), with the turns of `doppler`."""
+"""Doppler RANSAC on sparse points (Doer and Trommer, REVE, 2020), with the yaw rates of the method `doppler`."""

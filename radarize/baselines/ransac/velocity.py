@@ -1,7 +1,7 @@
-"""Ego-velocity from a sparse point cloud: three-point RANSAC, then least squares over what agrees.
+"""Ego-velocity from a sparse point cloud: three-point RANSAC, then least squares over the inliers.
 
-Doer and Trommer, "An EKF based approach to radar inertial odometry", MFI 2020 (REVE), without its filter: points of a
-static world close at u . v, u being their direction and v the sensor's velocity.
+Doer and Trommer, "An EKF based approach to radar inertial odometry", MFI 2020 (REVE), without its filter. Static points
+have the closing speed u . v, where u is the direction of the point and v the velocity of the sensor.
 """
 
 import math
@@ -15,30 +15,31 @@ from radarize.odometry.rotation import MapRotation
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
 
-#: (m/s)^2, of a velocity that the points do not tell.
+#: Variance of an unobservable velocity, (m/s)^2.
 _UNKNOWN = 1.0
 
 
-#: As published: m/s, by how much a point's speed may differ; share of points that may be wrong; probability that one
-#: hypothesis, at least, is made of right points alone.
+#: As published: maximum residual of an inlier, m/s; share of outliers; probability that at least one hypothesis is free
+#: of outliers.
 _INLIER, _OUTLIERS, _SUCCESS = 0.15, 0.4, 0.9999
-#: m/s: if the median of all speeds is less, the sensor stands (zero-velocity test); least deviation of a speed.
+#: Median speed below which the sensor stands still (zero-velocity test), m/s; minimum standard deviation of a speed,
+#: m/s.
 _STILL, _NOISE = 0.05, 0.02
-#: Triples of points that are tried.
+#: Number of hypotheses.
 HYPOTHESES = math.ceil(math.log(1 - _SUCCESS) / math.log(1 - (1 - _OUTLIERS) ** 3))
 
 
 class RansacVelocity:
-    """Velocity estimator; stateless between frames, whose triples come from one table."""
+    """Velocity estimator without state between frames; all frames use the same table of random triples."""
 
-    #: m, see `VelocityEstimator`; as published.
+    #: Lever arm of `VelocityEstimator`, m; zero as published.
     lever = 0.0
 
     def __init__(self):
         self._draws = np.random.default_rng(0).random((HYPOTHESES, 3))
 
     def estimate(self, batch: Batch) -> Velocities:
-        """Velocities of the next frames.
+        """Estimate velocities of the next frames.
 
         Raises:
             InputError: see `PointClouds`.
@@ -52,7 +53,7 @@ class RansacVelocity:
     def solve(
         self, points: Float[np.ndarray, "point 6"]
     ) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 2"], int]:
-        """Velocity of one frame (forward, left), m/s, its covariance, and the points that agree."""
+        """Estimate the velocity of one frame (forward, left), m/s, its covariance, and the number of inliers."""
         unknown = np.zeros(2), _UNKNOWN * np.eye(2), 0
         if len(points) < 3:
             return unknown
@@ -77,7 +78,7 @@ class RansacVelocity:
 
 
 def odometry(inputs: Inputs) -> Odometry:
-    """Least squares over a sparse point cloud, in the place of `doppler`'s."""
+    """Make odometry with RANSAC velocities in place of those of the method `doppler`."""
     settings = inputs.configuration
     rotation = MapRotation(inputs.signal.heatmaps, settings.rotation)
     return Odometry(inputs.radar, RansacVelocity(), rotation, settings.velocity)

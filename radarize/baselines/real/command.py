@@ -1,4 +1,4 @@
-"""``radarize benchmark real``."""
+"""The command ``radarize benchmark real``."""
 
 from pathlib import Path
 
@@ -21,10 +21,10 @@ def compare(
     workers: int | None,
     ray: str | None,
 ) -> None:
-    """Compare methods on real walks by the options of the command.
+    """Compare methods on RadarHD's real walks; arguments are the options of the command.
 
     Raises:
-        InputError: an option that cannot be, or see `real`.
+        InputError: an invalid option, or see `real`.
     """
     numbers = [number.strip() for number in walks.split(",")] if walks else []
     if wrong := [number for number in numbers if not number.isdecimal()]:
@@ -36,9 +36,11 @@ def compare(
     others = {name: Path(each) for name, each in named.items()}
     options = RealOptions([int(number) for number in numbers], others, weights, poses, workers, ray)
     with progress("real") as report:
-        results = real(data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
+        results = real(data, out, options, progress=report, log=lambda line: typer.echo(line, err=True))
     print_table(*results.tables[0].in_terminal(SHOWN))
     print(out / "real.md")
 
 
-REAL = OwnBenchmark("Points, turns and maps of real walks against a lidar (RadarHD's repository).", compare)
+REAL = OwnBenchmark(
+    "Point clouds, changes of yaw and maps on real walks, compared with a lidar (RadarHD's repository).", compare
+)

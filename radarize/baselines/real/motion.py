@@ -1,6 +1,6 @@
-"""Turns, trajectories and maps of real walks, from a radar's pictures and from scans that methods make of them.
+"""Changes of yaw, trajectories and maps on real walks, from a radar's pictures and from the scans of each method.
 
-The reference is the lidar beside the radar: its poses, and its points at these poses as the map.
+The reference is the lidar on the same rig: its poses, and the map of its points at these poses.
 """
 
 from collections.abc import Sequence
@@ -29,24 +29,26 @@ from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.grid import OccupancyGrid
 
-#: Frames over which turns are measured: 0.2 s.
+#: Frames over which changes of yaw are evaluated: 0.2 s.
 SPAN = 4
-#: Frames, standard deviation: turns are smoothed over 0.3 s. Chosen on walks 112, 113 and 120, where it takes the error
-#: from 1.01, 0.93, 0.83 to 0.74, 0.73, 0.59 deg; more gains little.
+#: Standard deviation of the Gaussian that smooths changes of yaw, frames: 0.3 s. Chosen on walks 112, 113 and 120,
+#: where it reduces the RMSE from 1.01, 0.93, 0.83 deg to 0.74, 0.73, 0.59 deg; a wider one gains little.
 SMOOTH = 6
-#: Columns by which pictures are shifted against each other at most: 57 deg/s.
+#: Maximum shift between two pictures, columns: 57 deg/s.
 _MOST = 4
-#: Errors of the odometry that SLAM is given: of a step's length and m per step; rad per step and as a bias, rad/s. A
-#: cart's wheel odometry as the lidar logs have it.
+#: Standard deviations of the simulated odometry's errors: share of a step's length and m per step; rad per step; bias
+#: of the yaw rate, rad/s. They are those of a cart's wheel odometry in the lidar logs.
 _STEP, _YAW, _BIAS = (0.05, 0.001), np.radians(0.1), np.radians(0.3)
-#: Of the back end: that for radar scans.
+#: Settings of the SLAM back end.
 _CONFIG = SlamConfig.preset("radar")
-#: m: cells of the lidar's map, how many frames must have seen one, and the distances at which maps agree.
+#: Cell size of the lidar's map, m; minimum number of frames with points in a cell; distances within which maps agree,
+#: m.
 _CELL, _SEEN, NEAR = 0.05, 3, (0.1, 0.2)
 
 
 def turn_errors(found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "frame 3"]) -> dict[str, float]:
-    """Of turns over `SPAN` frames up to each frame (nan: none), rad: RMSE in degrees, and how large turns are."""
+    """Return errors of changes of yaw over the `SPAN` frames up to each frame (rad; NaN: none): RMSE and median, and
+    the RMS of the true changes, deg."""
     true = np.full(len(poses), np.nan)
     true[SPAN:] = wrap(poses[SPAN:, 2] - poses[:-SPAN, 2])
     known = np.isfinite(found) & np.isfinite(true)
@@ -59,8 +61,8 @@ def turn_errors(found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "fra
 
 
 def shifted_turns(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame"]:
-    """Turns by shifting pictures against each other over azimuth: the place of the largest correlation, between
-    columns by a parabola."""
+    """Estimate changes of yaw over `SPAN` frames, rad, by the shift over azimuth that maximises the correlation of two
+    pictures, with parabolic interpolation between columns."""
     size = 2 * polar.COLUMNS
     spectra = np.fft.rfft(pictures.astype(np.float32), size, axis=2)
     found = np.full(len(pictures), np.nan)
@@ -76,8 +78,7 @@ def shifted_turns(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[n
 
 
 def smoothed(turns: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
-    """Turns averaged over neighbouring frames: rigs turn more smoothly than the estimates of their turns. Where a frame
-    has none (nan) its neighbours are, and it stays without."""
+    """Smooth changes of yaw over neighbouring frames with a Gaussian; frames without an estimate (NaN) stay NaN."""
     known = np.isfinite(turns)
     weights = gaussian_filter1d(known.astype(float), SMOOTH)
     averaged = gaussian_filter1d(np.where(known, turns, 0.0), SMOOTH) / np.maximum(weights, 1e-9)
@@ -87,9 +88,9 @@ def smoothed(turns: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
 def disturbed(
     poses: Float[np.ndarray, "frame 3"], seed: int
 ) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 3 3"]]:
-    """Poses as an odometry with errors would have added them up, and the covariance of each step.
+    """Simulate an odometry with errors: its integrated poses, and the covariance of each step.
 
-    Covariances know of each step alone: a bias counts as an error that is new every second.
+    Covariances are of independent steps: the bias of the yaw rate is modelled as an error that changes every second.
     """
     rng = np.random.default_rng(seed)
     steps = between(poses[:-1], poses[1:])
@@ -105,30 +106,30 @@ def disturbed(
     return np.array(found), covariance
 
 
-def followed(
+def matched_scans(
     ranges: Float[np.ndarray, "frame bearing"], rates: Float[np.ndarray, "frame 2"] | None
 ) -> tuple[Float[np.ndarray, "frame 3"], ErrorModel]:
-    """Poses by matching scans alone, and the errors of their steps.
+    """Estimate poses by scan matching alone, with the error model of the relative motions.
 
     Args:
         ranges: scans on `BEARINGS`, m.
-        rates: of turning, rad/s, and their variances, as a network tells them; nan: not known.
+        rates: yaw rates by a network, rad/s, and their variances; NaN where unknown.
     """
     batch = Batch(Signal(PRESETS["radarhd"]), None, stamps(len(ranges)))
-    told = None if rates is None else lambda batch: rates
+    known = None if rates is None else lambda batch: rates
     batch.ranges = np.where(np.isnan(ranges), np.inf, ranges)
-    matching = ScanMatching(rates=told, bearings=BEARINGS)
+    matching = ScanMatching(rates=known, bearings=BEARINGS)
     track = matching.update(batch)
     return track.pose, track.errors
 
 
 def network_rates(weights: Weights, pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame 2"]:
-    """Rates of turning over `SPAN` frames (rad/s) and their variances by a network that was trained in simulation; nan:
-    not known."""
+    """Estimate yaw rates over `SPAN` frames (rad/s) and their variances by a network trained in simulation; NaN where
+    pictures are missing."""
     inputs, times = Inputs(PRESETS["radarhd"], weights=weights), stamps(len(pictures))
     network, found = PictureRates(inputs), np.empty((len(pictures), 2))
     if round(network.span / PERIOD) != SPAN:
-        raise InputError(f"picture-turns: is of frames {network.span:g} s apart, expected {SPAN * PERIOD:g} s")
+        raise InputError(f"picture-turns: reads frames {network.span:g} s apart, expected {SPAN * PERIOD:g} s")
     for start in range(0, len(pictures), 64):
         some = slice(start, start + 64)
         found[some] = network.rates(Batch(inputs.signal, None, times[some], maps={"picture": pictures[some]}))
@@ -142,14 +143,14 @@ def mapped(
     odometry: Float[np.ndarray, "frame 3"],
     errors: ErrorModel | Float[np.ndarray, "frame 3 3"],
 ) -> dict[str, float]:
-    """SLAM with scans: error of its trajectory, and its map against the lidar's.
+    """Run SLAM on scans, and return the ATE of its trajectory (m) and the agreement of its map with the lidar's.
 
     Args:
-        ranges: scans on `BEARINGS`, m; nan: not known.
-        poses: true ones.
-        surface: of the lidar's map, m, in the frame of the poses.
-        odometry: that SLAM is given.
-        errors: of its steps, or their covariances.
+        ranges: scans on `BEARINGS`, m; NaN where unknown.
+        poses: true poses.
+        surface: occupied cells of the lidar's map, m, in the frame of the poses.
+        odometry: poses of the odometry.
+        errors: error model of the odometry's relative motions, or their covariances.
     """
     slam = Slam(_CONFIG)
     for frame in range(len(ranges)):
@@ -165,14 +166,14 @@ def mapped(
 
 
 def drift(odometry: Float[np.ndarray, "frame 3"], poses: Float[np.ndarray, "frame 3"]) -> float:
-    """ATE of an odometry, m."""
+    """Return the ATE of an odometry, m."""
     return float(_compared(stamps(len(poses)), odometry, poses).position.mean)
 
 
 def surface_of(
     clouds: Sequence[Float[np.ndarray, "point 2"]], poses: Float[np.ndarray, "frame 3"]
 ) -> Float[np.ndarray, "cell 2"]:
-    """The lidar's map: middles of the cells that it has points in from several frames, m."""
+    """Return the lidar's map: centres of the cells with points in at least three frames, m."""
     touched = [
         np.unique(np.floor(transform(pose, cloud) / _CELL).astype(int), axis=0)
         for pose, cloud in zip(poses, clouds, strict=True)
@@ -184,12 +185,13 @@ def surface_of(
 def map_agreement(
     grid: OccupancyGrid, turn: float, shift: Float[np.ndarray, "2"], surface: Float[np.ndarray, "point 2"]
 ) -> dict[str, float]:
-    """Share of occupied cells near the surface (precision), of the surface near occupied cells (recall), and F1.
+    """Return the share of occupied cells near the surface (precision), that of the surface near occupied cells
+    (recall), and F1.
 
     Args:
-        grid: map.
-        turn, shift: rad, m; from its frame to that of the surface.
-        surface: of the lidar's map, m.
+        grid: map of SLAM.
+        turn, shift: alignment from the frame of the map to that of the surface, rad and m.
+        surface: occupied cells of the lidar's map, m.
     """
     row, column = np.nonzero(grid.probability > 0.5)
     cells = transform(np.array([*shift, turn]), grid.origin + (np.column_stack([column, row]) + 0.5) * grid.resolution)
@@ -205,7 +207,8 @@ def map_agreement(
 def _alignment(
     found: Float[np.ndarray, "scan 3"], true: Float[np.ndarray, "scan 3"]
 ) -> tuple[float, Float[np.ndarray, "2"]]:
-    """Turn (rad) and shift (m) from one frame to the other, by headings: who stands has no positions to tell it."""
+    """Return rotation (rad) and translation (m) from one frame to the other. The rotation is from headings, because
+    positions do not determine it while the rig stands still."""
     apart = true[:, 2] - found[:, 2]
     turn = float(np.arctan2(np.sin(apart).mean(), np.cos(apart).mean()))
     return turn, true[:, :2].mean(axis=0) - transform(np.array([0.0, 0.0, turn]), found[:, :2]).mean(axis=0)

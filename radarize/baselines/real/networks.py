@@ -1,4 +1,4 @@
-"""Networks at work on a real walk's pictures: points, and first surfaces of those that tell them."""
+"""Inference of networks on the pictures of a real walk: points, and first surfaces where a network estimates them."""
 
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -23,10 +23,10 @@ Seen = tuple[Bool[np.ndarray, "frame range column"], Float[np.ndarray, "frame be
 
 
 class Reader(ABC):
-    """A network that goes through a walk once.
+    """Inference of a network on a stream of pictures.
 
     Args:
-        path: of its weights.
+        path: file of the network's weights.
 
     Raises:
         InputError: no such weights, or they are for another radar.
@@ -40,17 +40,22 @@ class Reader(ABC):
 
     @torch.inference_mode()
     def see(self, pictures: UInt8[np.ndarray, "frame range azimuth"], times: Float[np.ndarray, "frame"]) -> Seen:
-        """What it sees in a walk's next pictures, by their times (s)."""
+        """Return points and first surfaces in the next pictures of a walk.
+
+        Args:
+            pictures: the radar's pictures, 0...255.
+            times: time stamps of the pictures, s.
+        """
         shown = self._windows.push({"picture": pictures.astype(np.float16)}, times)[0]
-        return self._told(self.net.estimate(shown.maps), times)
+        return self._seen(self.net.estimate(shown.maps), times)
 
     @abstractmethod
-    def _told(self, likely: Tensor, times: Float[np.ndarray, "frame"]) -> Seen:
-        """What its estimates say."""
+    def _seen(self, likely: Tensor, times: Float[np.ndarray, "frame"]) -> Seen:
+        """Convert the network's probabilities to points and first surfaces."""
 
 
 class _Distributions(Reader):
-    """Ours: `radarize.baselines.pictures`."""
+    """Our network (`radarize.baselines.pictures`)."""
 
     network = PictureNet
 
@@ -58,26 +63,26 @@ class _Distributions(Reader):
         super().__init__(path)
         self._memory = Memory()
 
-    def _told(self, likely, times):
-        # Maps average over time themselves: their scans are each frame's own.
+    def _seen(self, likely, times):
+        # Scans are not averaged over time, because mapping averages them.
         cells = points(self._memory.push(likely, times), self.net.dense).numpy()
         return cells, on_bearings(first_surfaces(likely), BEARINGS)
 
 
 class _Drawings(Reader):
-    """RadarHD's: each cell that is likely enough is a point."""
+    """RadarHD's network: each cell above a probability is a point."""
 
     network = RadarHdPictureNet
 
-    def _told(self, likely, times):
+    def _seen(self, likely, times):
         return (likely > self.net.least).numpy(), None
 
 
-#: By what tables call them.
+#: Networks by their names in the tables.
 READERS: dict[str, type[Reader]] = {"network": _Distributions, "radarhd-simulated": _Drawings}
 
 
 def readers(weights: Weights) -> dict[str, Reader]:
-    """Those whose weights are there."""
+    """Return the networks whose weights are available, by name."""
     paths = {name: weights.of(kind.network.kind) for name, kind in READERS.items()}
     return {name: READERS[name](path) for name, path in paths.items() if path.is_file()}

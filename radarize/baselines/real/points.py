@@ -1,4 +1,4 @@
-"""What methods see in a real walk's pictures, frame by frame, and how far from the lidar's points that is."""
+"""Point clouds and scans of each method on a real walk, and their distances from the lidar's points."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -8,13 +8,13 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from radarize.baselines.real.networks import Reader
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.point_cloud_distance import PointCloudDistance
 from radarize.baselines.walks.poses import BEARINGS, scan, stamps
 from radarize.baselines.walks.walks import FIRST, Walk
 from radarize.signal import polar
 from radarize.signal.points import Cfar, level_around
 
-#: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
+#: CFAR detector of the methods `cfar` (all detections) and `first-echo` (the first detection of each azimuth).
 _CFAR = Cfar(window=8, guard=4, threshold=64.0)
 _BEFORE = ("picture", "cfar")
 
@@ -23,25 +23,25 @@ Ranges = Float[np.ndarray, "bearing"]
 
 
 class Distances(NamedTuple):
-    """How far a method's points of one frame are from the lidar's: of the same number, and of the same instant, nan
-    where the lidar has no picture of it."""
+    """Distances of a method's points of one frame from the lidar's, matched by frame index and by time; NaN where the
+    lidar has no picture."""
 
-    number: Apart
-    instant: Apart
+    by_index: PointCloudDistance
+    by_time: PointCloudDistance
 
 
 class Judged(NamedTuple):
-    """A walk.
+    """Results of all methods on a walk.
 
     Attributes:
-        apart: of each method, for every frame that is judged.
-        ranges: scans of each method, and of the lidar at the same instants.
-        partner: the lidar's frame of each frame's instant; -1: it has none.
-        clouds: the lidar's points, by its own frames.
-        pictures: the radar's.
+        distances: by method, distances of the points of every evaluated frame from the lidar's.
+        ranges: by method, scans on `BEARINGS`, m; `lidar`: those of the lidar at the same times.
+        partner: the lidar's frame nearest in time to each radar frame; -1 if the lidar has none.
+        clouds: the lidar's points of each of its frames, m.
+        pictures: the radar's pictures.
     """
 
-    apart: dict[str, list[Distances]]
+    distances: dict[str, list[Distances]]
     ranges: dict[str, Float[np.ndarray, "frame bearing"]]
     partner: Int[np.ndarray, "frame"]
     clouds: list[Float[np.ndarray, "point 2"]]
@@ -55,7 +55,7 @@ def judge(
     others: dict[str, dict[int, Float[np.ndarray, "point 2"]]],
     report: Callable[[float], None],
 ) -> Judged:
-    """Go through a walk's frames once; `report` takes how many are done."""
+    """Run all methods on a walk; `report` takes the number of frames done."""
     partner = clock.partners(walk.frames)
     clouds = [polar.cartesian(walk.lidar(frame)) for frame in range(walk.frames)]
     found = Judged({}, {}, partner, clouds, np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8))
@@ -63,14 +63,14 @@ def judge(
     for frame, picture, cells, first in _methods(walk, networks):
         same = clouds[partner[frame]] if partner[frame] >= 0 else nothing
         found.pictures[frame] = picture
-        told = {name: polar.cartesian(each) for name, each in cells.items()}
-        told |= {name: known[frame] for name, known in others.items() if frame in known}
-        for name, each in told.items():
+        points = {name: polar.cartesian(each) for name, each in cells.items()}
+        points |= {name: known[frame] for name, known in others.items() if frame in known}
+        for name, each in points.items():
             if frame >= FIRST:
-                apart = Distances(Apart.of(each, clouds[frame]), Apart.of(each, same))
-                found.apart.setdefault(name, []).append(apart)
-        # The nearest points; pictures and CFAR have many that stand before a surface.
-        scans = {name: scan(each) for name, each in (told | {"lidar": same}).items() if name not in _BEFORE}
+                distances = Distances(PointCloudDistance.of(each, clouds[frame]), PointCloudDistance.of(each, same))
+                found.distances.setdefault(name, []).append(distances)
+        # Scans of the nearest points; pictures and CFAR have many points in front of a surface.
+        scans = {name: scan(each) for name, each in (points | {"lidar": same}).items() if name not in _BEFORE}
         for name, each in (scans | first).items():
             if name not in found.ranges:
                 found.ranges[name] = np.full((walk.frames, len(BEARINGS)), np.nan)
@@ -82,8 +82,8 @@ def judge(
 def _methods(
     walk: Walk, networks: dict[str, Reader]
 ) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells], dict[str, Ranges]]]:
-    """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
-    surfaces themselves."""
+    """Yield for each frame of a walk: frame index, picture, cells with points by method, and scans of those methods
+    that estimate first surfaces themselves."""
     times = stamps(walk.frames)
     for frames, pictures in walk.batches():
         seen = {name: network.see(pictures, times[frames]) for name, network in networks.items()}

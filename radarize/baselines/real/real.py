@@ -1,8 +1,9 @@
-"""`radarize benchmark real`: what methods make of a real radar's pictures, against the lidar beside it: points
-(`radarize.baselines.real.points`), turns, trajectories and maps (`radarize.baselines.real.motion`).
+"""`radarize benchmark real`: errors of methods on a real radar's pictures, with the lidar of the same rig as reference:
+point clouds (`radarize.baselines.real.points`), changes of yaw, trajectories and maps
+(`radarize.baselines.real.motion`).
 
-The data set's measures compare pictures of one number, which are not of one instant (`radarize.baselines.walks.clock`).
-Both are reported: by number, as published, and by instant.
+The data set's metrics compare pictures of equal frame index, whose times differ (`radarize.baselines.walks.clock`).
+Errors are reported both ways: matched by frame index, as published, and matched by time.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -19,8 +20,8 @@ from radarize.baselines.real.motion import (
     SPAN,
     disturbed,
     drift,
-    followed,
     mapped,
+    matched_scans,
     network_rates,
     shifted_turns,
     smoothed,
@@ -30,7 +31,7 @@ from radarize.baselines.real.motion import (
 from radarize.baselines.real.networks import READERS, readers
 from radarize.baselines.real.points import Distances, Judged, judge
 from radarize.baselines.walks.clock import Clock
-from radarize.baselines.walks.poses import by_instant, poses_of
+from radarize.baselines.walks.poses import matched_by_time, poses_of
 from radarize.baselines.walks.walks import PERIOD, Predictions, Walk
 from radarize.evaluation.benchmark.choices import NamedWalk as Facts
 from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, command, machine
@@ -40,56 +41,59 @@ from radarize.io.jobs import Report, perform
 from radarize.pipeline.method import Weights
 
 NOTES = (
-    "Medians over all frames from the 40th on, points through the authors' grid; +-: standard error, with as many "
-    "independent frames as the errors' autocorrelation leaves.",
-    "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
-    "told what the model card names.",
-    "`radarhd-simulated` is RadarHD's network, trained on the simulated walks that `network` has seen, with its rule "
-    "for points: each cell above a probability. `RadarHD` is its authors' own, trained on 25 real walks.",
-    "By number: with the lidar's picture of the same number, as the authors measure. By instant (`instant`): with the "
-    "lidar's picture of the same time, see the table of clocks.",
-    f"Turns over {SPAN * PERIOD:g} s, from pictures alone; `smoothed`: with those before and after them, by a Gaussian "
-    f"of {SMOOTH * PERIOD:g} s standard deviation, so known later.",
-    "ATE and map (F1 within 20 cm) of SLAM with each method's scans and an odometry whose errors are drawn; `lidar`: "
-    "with the lidar's own first points, the best there is. Both by instant.",
+    "Chamfer and modified Hausdorff distances: medians over all frames from the 40th on, m, with points on the "
+    "authors' grid; +-: standard error of the median, which accounts for the autocorrelation of the errors.",
+    "`network` was trained on simulated walks only; no setting was chosen on test walks. The model card lists what was "
+    "chosen on training walks of this data set.",
+    "`radarhd-simulated` is RadarHD's network, trained on the same simulated walks as `network`; each cell above a "
+    "probability is a point, as in the original. `RadarHD` has its authors' weights, trained on 25 real walks.",
+    "Columns without `instant`: matched with the lidar's picture of the same frame index, as the authors do. Columns "
+    "with `instant`: matched by time, see the table of clocks.",
+    f"yaw_rmse_deg: RMSE of the change of yaw over {SPAN * PERIOD:g} s, estimated from pictures alone; `smoothed`: "
+    f"with a Gaussian of {SMOOTH * PERIOD:g} s standard deviation over frames before and after. turns_rms_deg: RMS of "
+    "the true changes of yaw.",
+    "ate_m and map_f1 (within 20 cm): SLAM with each method's scans and an odometry with simulated errors; `lidar`: "
+    "with the lidar's first points, which is the lower bound of the errors. Both are matched by time.",
 )
 MAP_NOTE = (
-    "With the same odometry for all methods: the lidar's poses with errors added, of a size that SLAM is told, see "
-    "`radarize.baselines.real.motion`; `alone`: odometry, too, is by matching scans, for `network` with the turns that "
-    "its partner tells. Maps against the lidar's points at its poses, of which three frames have seen a cell of 5 cm. "
-    "`odometry`: its ATE without SLAM."
+    "All methods have the same odometry: the lidar's poses with simulated errors, whose covariance is known to SLAM "
+    "(`radarize.baselines.real.motion`). Columns with `alone`: odometry is scan matching as well; for `network` with "
+    "changes of yaw by the network `picture-turns`. The reference map has the cells of 5 cm in which the lidar has "
+    "points in at least three frames. odometry_ate_m: ATE without SLAM, m."
 )
 
 CLOCK_NOTE = (
-    "By how many seconds the lidar's picture is later than the radar's of the same number, at a walk's start and end; "
-    "correlation of pictures of one number, and of one instant; by how much two halves of the walk differ. By pictures "
-    "alone (`radarize.baselines.walks.clock`); without figures: too short, or nothing moved, and taken as numbered."
+    "start_s, end_s: delay of the lidar's picture against the radar's of equal frame index, at start and end of a "
+    "walk; mean correlation of pictures matched by frame index and by time; halves differ_s: largest difference "
+    "between the clocks of two halves of the walk. Clocks are estimated from the pictures alone "
+    "(`radarize.baselines.walks.clock`). Rows without figures: the walk is too short or has no motion, and is matched "
+    "by frame index."
 )
-#: The network that tells turns.
+#: Kind of the network that estimates changes of yaw.
 TURNS = "picture-turns"
-#: Columns that a terminal shows.
+#: Columns of the table in the terminal.
 SHOWN = (
     "walk", "method", "chamfer_m", "mod_hausdorff_m", "instant_chamfer_m", "yaw_rmse_deg", "instant_yaw_rmse_deg",
     "ate_m", "map_f1",
 )  # fmt: skip
 
 
-#: Figures of a walk that are said as soon as it is done.
-_SAID = ("chamfer_m", "yaw_rmse_deg", "ate_m")
+#: Figures that are logged as soon as a walk is done.
+_LOGGED = ("chamfer_m", "yaw_rmse_deg", "ate_m")
 
 
 @dataclass(frozen=True)
 class RealOptions:
-    """What is compared.
+    """Options of the comparison.
 
     Attributes:
-        walks: numbers; all that test if none.
-        predictions: of other programs by name.
+        walks: numbers of the walks; all test walks if empty.
+        predictions: folders of other programs' point clouds by name.
         weights: folder of the networks' weights; the shipped ones if None.
-        poses: folder of true poses, NUMBER.tum, on the lidar's clock; by SLAM with the lidar's scans if None.
-        workers: walks at a time; as many as there are cores if None.
+        poses: folder of true poses NUMBER.tum on the lidar's clock; estimated by SLAM with the lidar if None.
+        workers: number of walks processed at a time; number of cores if None.
         ray: address of a Ray cluster to use instead.
-        command: that the results name.
+        command: command that is printed with the results.
     """
 
     walks: Sequence[int] = ()
@@ -107,21 +111,21 @@ def real(
     options: RealOptions = RealOptions(),  # noqa: B008
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    say: Callable[[str], None] = lambda line: None,
+    log: Callable[[str], None] = lambda line: None,
 ) -> Results:
-    """Compare what methods make of real pictures with a lidar's points.
+    """Compare methods on the pictures of real walks, with a lidar as reference.
 
     Args:
         data: ``dataset_5`` of a clone of RadarHD's repository.
         output: folder to write: real.json and real.md.
-        options: what is compared.
+        options: walks, predictions and weights.
         progress: called with (frames done, frames in all).
-        say: takes a line for every method on a walk that is done.
+        log: called with a line of figures for every method on a walk that is done.
 
     Raises:
         InputError: no such walk, or a damaged picture.
     """
-    machine()  # as things are now
+    machine()  # read now, because sources may change during a long run
     walks = [Walk.find(data, number) for number in options.walks] or Walk.tests(data)
     total = sum(walk.frames for walk in walks)
     done: dict[str, int] = {}
@@ -133,13 +137,13 @@ def real(
         if news.ended:
             found[news.name] = compared = cast(_Compared, news.result)
             for row in compared.rows:
-                figures = (f"{name} {row[name]:.3g}" for name in _SAID if np.isfinite(row.get(name, np.nan)))
-                say(f"{news.name}, {row['method']}: {', '.join(figures)}")
+                figures = (f"{name} {row[name]:.3g}" for name in _LOGGED if np.isfinite(row.get(name, np.nan)))
+                log(f"{news.name}, {row['method']}: {', '.join(figures)}")
         else:
             done[news.name] = int(news.done)
         progress(sum(done.values()), total)
     each = [found[name] for name in jobs]
-    errors = {key: apart for one in each for key, apart in one.apart.items()}
+    errors = {key: distances for one in each for key, distances in one.distances.items()}
     data_of = Data("RadarHD's walks", tuple(Facts.radarhd(walk.number) for walk in walks))
     tables = [
         Table("Real walks", [row for one in each for row in one.rows], list(NOTES)),
@@ -156,43 +160,43 @@ def real(
 
 
 class _Compared(NamedTuple):
-    """What comes of a walk: rows of the tables, and how far each method's points are off, by walk and method."""
+    """Results of a walk: rows of the tables, and distances of each method's points by walk and method."""
 
     rows: list[dict[str, Any]]
     clock: dict[str, float]
     maps: list[dict[str, Any]]
-    apart: dict[tuple[int, str], list[Distances]]
+    distances: dict[tuple[int, str], list[Distances]]
 
 
 def _compare(walk: Walk, options: RealOptions, report: Report) -> _Compared:
-    """All methods on a walk; `report` takes frames done."""
+    """Evaluate all methods on a walk; `report` takes the number of frames done."""
     weights = Weights(options.weights)
     poses = poses_of(walk, options.poses)
     others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
     clock = Clock.of(walk)
     judged = judge(walk, clock, readers(weights), others, lambda done: report(done / 2))
-    told = {"shifted pictures": shifted_turns(judged.pictures)}
+    turns = {"shifted pictures": shifted_turns(judged.pictures)}
     rates = network_rates(weights, judged.pictures) if weights.of(TURNS).is_file() else None
     if rates is not None:
-        told["network"] = SPAN * PERIOD * rates[:, 0]
-    told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
-    moved = {name: clocked_turn_errors(each, poses, clock) for name, each in told.items()}
+        turns["network"] = SPAN * PERIOD * rates[:, 0]
+    turns |= {f"{name}, smoothed": smoothed(each) for name, each in turns.items()}
+    moved = {name: clocked_turn_errors(each, poses, clock) for name, each in turns.items()}
     maps, rows = _maps(walk, judged, poses, rates, lambda share: report(walk.frames * (1 + share) / 2)), []
     mapped_by = {str(row["method"]): row for row in maps}
-    for name in dict.fromkeys([*judged.apart, *moved, *mapped_by]):
+    for name in dict.fromkeys([*judged.distances, *moved, *mapped_by]):
         about = {"walk": walk.number, "part": walk.folder.name, "method": name}
-        row = about | _row(judged.apart.get(name, [])) | moved.get(name, {})
+        row = about | _row(judged.distances.get(name, [])) | moved.get(name, {})
         best = mapped_by.get(name, {})
         rows.append(row | {"ate_m": best.get("ate_m", np.nan), "map_f1": best.get("map_f1_20cm", np.nan)})
-    apart = {(walk.number, name): each for name, each in judged.apart.items()}
-    return _Compared(rows, {"walk": walk.number} | clock.row(walk.frames), maps, apart)
+    distances = {(walk.number, name): each for name, each in judged.distances.items()}
+    return _Compared(rows, {"walk": walk.number} | clock.row(walk.frames), maps, distances)
 
 
 def clocked_turn_errors(
     found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "frame 3"], clock: Clock
 ) -> dict[str, float]:
-    """Errors of turns up to each frame (rad), by number and by instant."""
-    same = turn_errors(found, by_instant(poses, clock))
+    """Return errors of changes of yaw up to each frame (rad), with poses matched by frame index and by time."""
+    same = turn_errors(found, matched_by_time(poses, clock))
     return turn_errors(found, poses) | {"instant_yaw_rmse_deg": same["yaw_rmse_deg"]}
 
 
@@ -203,19 +207,25 @@ def _maps(
     rates: Float[np.ndarray, "frame 2"] | None,
     report: Report,
 ) -> list[dict[str, object]]:
-    """A row for the scans of each method; `rates` of turning are those of our networks alone. `report` takes the share
-    of methods that are done."""
+    """Return a row of the table of maps for the scans of each method.
+
+    Args:
+        walk, judged: a walk, and the results of all methods on it.
+        poses: true poses of the lidar's frames.
+        rates: yaw rates by the network (rad/s) and their variances, for the method `network`.
+        report: takes the share of methods that are done.
+    """
     surface, there = surface_of(judged.clouds, poses), judged.partner >= 0
     poses = poses[judged.partner[there]]
-    odometry, claimed = disturbed(poses, walk.number)
+    odometry, covariance = disturbed(poses, walk.number)
     off, rows = drift(odometry, poses), []
     for name, each in judged.ranges.items():
         ranges = each[there]
-        matched, errors = followed(ranges, rates[there] if name == "network" and rates is not None else None)
+        matched, errors = matched_scans(ranges, rates[there] if name == "network" and rates is not None else None)
         alone = mapped(ranges, poses, surface, matched, errors)
         rows.append(
             {"walk": walk.number, "method": name, "odometry_ate_m": off}
-            | mapped(ranges, poses, surface, odometry, claimed)
+            | mapped(ranges, poses, surface, odometry, covariance)
             | {"alone_odometry_ate_m": drift(matched, poses)}
             | {"alone_ate_m": alone["ate_m"], "alone_map_f1_20cm": alone["map_f1_20cm"]}
         )
@@ -224,16 +234,16 @@ def _maps(
 
 
 def _row(found: Sequence[Distances]) -> dict[str, float]:
-    chamfer = np.array([frame.number.chamfer for frame in found])
+    chamfer = np.array([frame.by_index.chamfer for frame in found])
     known = chamfer[np.isfinite(chamfer)]
     return {
         "frames": len(found),
         "without points": len(chamfer) - len(known),
         "chamfer_m": _median(chamfer),
         "chamfer +-": median_error(known),
-        "mod_hausdorff_m": _median([frame.number.hausdorff for frame in found]),
-        "instant_chamfer_m": _median([frame.instant.chamfer for frame in found]),
-        "instant_mod_hausdorff_m": _median([frame.instant.hausdorff for frame in found]),
+        "mod_hausdorff_m": _median([frame.by_index.hausdorff for frame in found]),
+        "instant_chamfer_m": _median([frame.by_time.chamfer for frame in found]),
+        "instant_mod_hausdorff_m": _median([frame.by_time.hausdorff for frame in found]),
         "yaw_rmse_deg": np.nan,
         "instant_yaw_rmse_deg": np.nan,
         "turns_rms_deg": np.nan,
@@ -241,13 +251,14 @@ def _row(found: Sequence[Distances]) -> dict[str, float]:
 
 
 def _median(values: Iterable[float]) -> float:
-    """Of those that are numbers."""
+    """Return the median of finite values; NaN without any."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.median(known)) if known else np.nan
 
 
 def _paired(errors: dict[tuple[int, str], list[Distances]]) -> list[dict]:
-    """Of each pair of methods, how much nearer the first one is, mean over walks of the mean over common frames."""
+    """Return the difference of Chamfer distances of each pair of methods: mean over walks of the mean over common
+    frames, with its standard error over walks."""
     names = list(dict.fromkeys(name for _, name in errors))
     rows = []
     for k, name in enumerate(names):
@@ -257,23 +268,24 @@ def _paired(errors: dict[tuple[int, str], list[Distances]]) -> list[dict]:
                 continue
             row = {"method": name, "against": other, "walks": len(walks)}
             for by in Distances._fields:
-                apart = []
+                differences = []
                 for walk in walks:
                     a, b = errors[walk, name], errors[walk, other]
-                    common = min(len(a), len(b))  # predictions begin later, and end with the walk
+                    common = min(len(a), len(b))  # predictions start later than the walk and end with it
                     pairs = zip(a[-common:], b[-common:], strict=True)
-                    apart.append(
+                    differences.append(
                         np.nanmean([getattr(one, by).chamfer - getattr(two, by).chamfer for one, two in pairs])
                     )
-                spread = float(np.std(apart, ddof=1) / np.sqrt(len(apart))) if len(apart) > 1 else np.nan
-                row |= {f"chamfer apart by {by}_m": float(np.mean(apart)), f"+- by {by}": spread}
+                count, matching = len(differences), {"by_index": "by frame index", "by_time": "by time"}[by]
+                error = float(np.std(differences, ddof=1) / np.sqrt(count)) if count > 1 else np.nan
+                row |= {f"chamfer difference {matching}_m": float(np.mean(differences)), f"+- {matching}": error}
             rows.append(row)
     return rows
 
 
 def median_error(values: Float[np.ndarray, "frame"]) -> float:
-    """Standard error of the median of consecutive frames' errors: sqrt(pi / 2) that of the mean, which has as many
-    independent frames as the sum of the autocorrelation until it first vanishes leaves (Geyer, 1992)."""
+    """Return the standard error of the median of errors of consecutive frames: sqrt(pi / 2) times that of the mean,
+    with the integrated autocorrelation time up to the first zero of the autocorrelation (Geyer, 1992)."""
     if len(values) < 4 or not np.ptp(values):
         return np.nan
     centred = values - values.mean()

@@ -1,1 +1,1 @@
-"""RNIN (Chen et al., ISMAR 2021): an IMU alone."""
+"""RNIN (Chen et al., ISMAR 2021): odometry from an IMU alone."""

@@ -1,7 +1,7 @@
-"""RNIN: displacement from an IMU alone, by what a walker's accelerations look like.
+"""RNIN: displacement from an IMU alone, learned from the accelerations of walking people.
 
 Chen et al., "RNIN-VIO: robust neural inertial navigation aided visual-inertial odometry in challenging scenes", ISMAR
-2021; its network, without the filter that follows it there.
+2021; the network, without the filter of the paper.
 """
 
 from collections.abc import Sequence
@@ -13,16 +13,16 @@ from torch import Tensor, nn
 from radarize.learning.nets.resnet import stages
 from radarize.learning.nets.weights import Network
 
-#: s, of a window, and its samples.
+#: Length of a window, s, and number of its samples.
 LASTS, SAMPLES = 1.0, 100
 
 
 class RninNet(Network):
-    """Consecutive windows of IMU samples, levelled, to the displacement in each.
+    """Network from consecutive windows of levelled IMU samples to the displacement in each.
 
     Args:
-        frames: windows, oldest first; ten in the original.
-        maps: names of what it reads of a frame: the window that ends there.
+        frames: number of windows, oldest first; ten in the original.
+        maps: name of the input of a frame: the window that ends there.
         width: channels of the first stage; 64 in the original, with 5.36 M parameters.
     """
 
@@ -39,17 +39,17 @@ class RninNet(Network):
         )
         self.memory = nn.LSTM(2 * width * steps, 4 * width, batch_first=True)
         self.mean, self.log_deviation = (_head(4 * width) for _ in range(2))
-        #: Logarithm of what standard deviations are multiplied with; training fits it on validation data.
+        #: Logarithm of a factor of the standard deviations; fitted on validation data.
         self.register_buffer("spread", torch.zeros(()))
 
     def forward(
         self, windows: Float[Tensor, "item window sample 6"]
     ) -> tuple[Float[Tensor, "item window 3"], Float[Tensor, "item window 3"]]:
-        """Displacement in each window (m) and the logarithm of its standard deviation.
+        """Estimate the displacement in each window (m) and the logarithm of its standard deviation.
 
         Args:
-            windows: specific force less gravity (m/s^2) and angular velocity (rad/s) on axes of which the third points
-                up and that do not turn with the sensor; the answers are on the same.
+            windows: specific force minus gravity (m/s^2) and angular velocity (rad/s), on levelled axes (z up) that do
+                not rotate with the sensor. Displacements are on the same axes.
         """
         x = windows.flatten(0, 1).transpose(1, 2)
         x = self.narrow(self.stages(self.stem(x)))
@@ -59,7 +59,7 @@ class RninNet(Network):
     def estimate(
         self, windows: Float[Tensor, "item window sample 6"]
     ) -> tuple[Float[Tensor, "item 2"], Float[Tensor, "item 2 2"]]:
-        """Horizontal displacement in the newest window, m, and its covariance."""
+        """Estimate the horizontal displacement in the newest window, m, and its covariance."""
         mean, deviation = (found[:, -1, :2] for found in self(windows))
         return mean, torch.diag_embed((2 * (deviation + self.spread)).exp())
 

@@ -1,4 +1,4 @@
-"""RNIN as odometry of a stream of frames: displacements over a second, told anew at every frame."""
+"""RNIN as odometry of a stream of frames: displacements over a second, estimated at every frame."""
 
 import numpy as np
 import torch
@@ -12,12 +12,12 @@ from radarize.odometry.integration import Track, intervals
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
 
-#: rad, by how much a heading integrated from angular velocities drifts in a second.
+#: Drift of a heading integrated from angular velocities in a second, rad.
 _DRIFT = np.radians(0.1)
 
 
 class RninOdometry(InertialOdometry):
-    """Odometry by `RninNet`: from an IMU alone; the radar's frames are only the clock."""
+    """Odometry by `RninNet` from an IMU alone; the radar's frames only set the times of the poses."""
 
     network, lasts = RninNet, LASTS
 
@@ -27,7 +27,7 @@ class RninOdometry(InertialOdometry):
 
     @torch.inference_mode()
     def update(self, batch: Batch) -> Track:
-        """Poses of the next frames."""
+        """Estimate poses of the next frames."""
         centers = batch.centers
         steps = intervals(centers, self.path.time)
         with stage("translation"):
@@ -39,7 +39,7 @@ class RninOdometry(InertialOdometry):
         return as_track(centers, track, turn_seen=True)
 
     def _displacement(self, instant: float) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement in the last window, and its covariance, from as many windows as there are by now."""
+        """Estimate the displacement in the last window and its covariance, from the windows available so far."""
         there = self._ago <= max(instant - self.imu.time[0], 0.0)
         windows = self.imu.levelled(instant - self._ago[there], SAMPLES)
         mean, covariance = self.net.estimate(torch.from_numpy(windows[None]).float())

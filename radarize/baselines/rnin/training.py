@@ -1,6 +1,7 @@
-"""RNIN's training: its paper's loss, augmentations and hyper-parameters, but for the width.
+"""Training of RNIN with its paper's loss, augmentations and hyper-parameters, except the width.
 
-Where the paper tells errors apart only by their squares, uncertainty is learned without touching what is told.
+The standard deviations are trained by their likelihood on top of the paper's squared error, without an effect on the
+displacements.
 """
 
 from collections.abc import Sequence
@@ -25,21 +26,21 @@ def _levelled(recording: Recording, frames: slice) -> Float[np.ndarray, "frame s
 
 
 def displacement(recording: Recording, frames: slice) -> Float[np.ndarray, "frame 3"]:
-    """What RNIN should say: how far the sensor truly came in that window, m, on the same level axes."""
+    """Return the true displacement in the window before each frame, m, on the levelled axes of the IMU."""
     known = recording.read("truth/time") if recording.has("truth/time") else instants(recording)
     ends = instants(recording)[frames]
     poses = recording.read("truth/pose")
     before, after = (
         np.column_stack([np.interp(t, known, poses[:, axis]) for axis in range(3)]) for t in (ends - LASTS, ends)
     )
-    # Level axes differ from the world's by a heading that only the truth can tell.
+    # The levelled axes differ from the world's by a heading, which follows from the true poses.
     yaw = np.interp(ends - LASTS, known, np.unwrap(planar(poses)[:, 2]))
     off = Rotation.from_rotvec(np.outer(Imu.of(recording).yaw(ends - LASTS) - yaw, [0, 0, 1]))
     return off.apply(after - before).astype(np.float32)
 
 
 class Rnin(Motion):
-    """Displacements in consecutive windows of a second, on level axes, m."""
+    """Training task: displacements in consecutive windows of a second, on levelled axes, m."""
 
     network, sensed = RninNet, (Reading("levelled", "imu/time", _levelled),)
     truth = (Reading("displacement", "truth/pose", displacement),)
@@ -57,7 +58,7 @@ class Rnin(Motion):
         return table.truth["displacement"][frames]
 
     def augment(self, windows: Tensor, label: Tensor, generator: Generator) -> tuple[Tensor, Tensor]:
-        """Any heading, biases of up to 0.1 m/s^2 and 0.002 rad/s, and axes off level by up to 5 deg."""
+        """Add a random heading, biases of up to 0.1 m/s^2 and 0.002 rad/s, and a tilt of up to 5 deg."""
         count = len(label)
         yaw, way, size = (torch.rand(count, generator=generator, device=label.device) for _ in range(3))
         turn = rotation(torch.tensor([0.0, 0, 1], device=label.device) * 2 * torch.pi * yaw[:, None])
@@ -84,13 +85,13 @@ class Rnin(Motion):
 
 
 def displaced(mean: Float[Tensor, "item window 3"], label: Float[Tensor, "item window 3"]) -> Float[Tensor, "item"]:
-    """Squared errors of displacements, and eight times those of the way since the first window."""
+    """Return squared errors of displacements plus eight times those of the position since the first window."""
     error = mean - label
     return (error.square() + 8 * error.cumsum(dim=1).square()).sum(dim=2).mean(dim=1)
 
 
 def rotation(vector: Float[Tensor, "item 3"]) -> Float[Tensor, "item 3 3"]:
-    """Rotation matrices of rotation vectors."""
+    """Convert rotation vectors to rotation matrices."""
     x, y, z = vector.unbind(1)
     zero = torch.zeros_like(x)
     return torch.linalg.matrix_exp(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=1).reshape(-1, 3, 3))

@@ -1,1 +1,1 @@
-"""Odometry from scans alone, whatever they are made with."""
+"""Odometry by scan matching, on the scans of any method."""

@@ -1,4 +1,5 @@
-"""Odometry from scans: each is matched with a grid of the last few, where constant velocity puts it."""
+"""Odometry by scan matching: each scan is matched with a grid of the last key scans, starting from constant
+velocity."""
 
 from collections import deque
 from collections.abc import Callable
@@ -19,22 +20,22 @@ from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import match
 from radarize.slam.node import Node, Scan
 
-#: m/s^1.5 and rad/s^1.5: by how much velocity and rate of turn wander in a second.
+#: Random walk of velocity and yaw rate, m/s^1.5 and rad/s^1.5.
 _WANDER = np.array([1.0, 1.0, 2.0])
-#: m/s and rad/s: standard deviations of a motion that nothing is known of.
+#: Standard deviation of an unknown motion, m/s and rad/s.
 _ANY_RATE = np.array([1.0, 1.0, 1.0])
-#: Scans in the grid, each added once the sensor has moved by as much as the settings make a node of; and as of `match`:
-#: a scan's errors are much the same in the next, so each counts little.
+#: Number of key scans in the grid, each added after a motion of the length of a node; standard deviation of a residual
+#: for `match`: large, because the errors of consecutive scans are correlated.
 _KEYS, _SIGMA = 12, 3.0
 
 
 class ScanMatching:
-    """Odometry of a stream of frames: a Kalman filter of pose and velocity, whose measurement is the match.
+    """Odometry of a stream of frames: a Kalman filter of pose and velocity, whose measurements are scan matches.
 
     Args:
-        settings: of node, grid and matcher.
-        rates: says rate of turning (rad/s) and its variance of each frame, NaN where it does not know; None: nobody.
-        bearings: of the scans, rad.
+        settings: settings of nodes, grid and matcher.
+        rates: returns yaw rate (rad/s) and variance of each frame, NaN where unknown; None: without yaw rates.
+        bearings: bearings of the scans, rad.
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class ScanMatching:
         self._spread = np.diag([*np.zeros(3), *_ANY_RATE**2])  # of pose and rate, in the sensor's frame
 
     def update(self, batch: Batch) -> Track:
-        """Poses of the next frames."""
+        """Estimate poses of the next frames."""
         centers = batch.centers
         steps = intervals(centers, self._time)
         ranges = batch.ranges
@@ -72,7 +73,8 @@ class ScanMatching:
         return Track(centers, poses, moved, rates[:, :2], spreads[:, :2, :2], seen, seen, errors)
 
     def _step(self, scan: Scan, dt: float, turning: Float[np.ndarray, "2"]) -> bool:
-        """Move on to the next scan, and to a rate of turning with its variance; whether there are points to match."""
+        """Predict and update the filter with a scan and a yaw rate with its variance; return whether the scan has
+        enough points to match."""
         first, self._time = self._time is None, scan.time
         node = Node.gather([scan], self.settings)
         points = node.points
@@ -93,7 +95,7 @@ class ScanMatching:
         return seen
 
     def _turn(self, rate: float, variance: float) -> None:
-        """Take in a rate of turning and its variance."""
+        """Update the filter with a yaw rate (rad/s) and its variance."""
         gain = self._spread[:, 5] / (self._spread[5, 5] + variance)
         change = gain * (rate - self._rate[2])
         self._rate = self._rate + change[3:]
@@ -101,7 +103,7 @@ class ScanMatching:
         self._spread = self._spread - np.outer(gain, self._spread[5])
 
     def _correct(self, points: Float[np.ndarray, "point 2"]) -> None:
-        """Fit the pose of a scan to the grid; the rate follows as much as its error goes along with the pose's."""
+        """Update the filter with the match of a scan; velocity is corrected through its correlation with the pose."""
         prior = self._spread[:3, :3]
         found = match(self._grid, points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
         fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)
@@ -112,7 +114,7 @@ class ScanMatching:
         self._pose = found.pose
 
     def _add(self, node: Node) -> None:
-        """A key scan joins the grid, which is drawn anew from those that are left."""
+        """Add a key scan, and compute the grid from the last key scans."""
         self._keys.append((self._pose, node))
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         for pose, key in self._keys:
@@ -121,7 +123,7 @@ class ScanMatching:
 
 
 def odometry(inputs: Inputs) -> ScanMatching:
-    """By the pipeline's scans."""
+    """Make odometry by matching the pipeline's scans."""
     return ScanMatching()
 
 

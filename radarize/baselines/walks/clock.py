@@ -1,12 +1,12 @@
-"""Which picture of a real walk's lidar is of the same instant as one of its radar's.
+"""Clock offset and rate between the radar and the lidar of a real walk, estimated from their pictures.
 
-RadarHD's data set numbers both from 0 on, and its measures compare those of one number. But over the same time the
-lidar has more of them: 2 to 3 % in the building of the training, 5 to 8 % in another. Pictures of one number are up to
-2.5 s apart: at the start the lidar's is later, at the end the radar's.
+RadarHD's data set counts the frames of both sensors from 0, and its metrics compare frames of equal index. The lidar
+has more frames in the same time: 2 to 3 % more in the building of the training walks, 5 to 8 % in another building.
+Frames of equal index are up to 2.5 s apart: the lidar's is later at the start of a walk, the radar's at the end.
 
-Both see the same surfaces. So each picture of the radar is correlated with pictures of the lidar some frames before and
-after it, and the line on which they are most alike, over the whole walk, tells both clocks. Nothing else is used: no
-poses, no network.
+Both sensors see the same surfaces. Each picture of the radar is correlated with the lidar's pictures of up to
+`MAX_SHIFT` frames before and after it; the straight line of largest mean correlation over the whole walk gives offset
+and rate. Neither poses nor networks are used.
 """
 
 from collections.abc import Callable
@@ -19,113 +19,115 @@ from scipy.ndimage import gaussian_filter
 from radarize.baselines.walks.walks import PERIOD, Walk
 from radarize.signal import polar
 
-#: Frames by which pictures may be apart, and by which their distance may grow per frame.
-APART, _DRIFTS = 100, np.arange(-0.15, 0.1501, 0.0025)
-#: Rows that are averaged, and deviations (frames, rows, columns) of the Gaussian that smooths what is left, so that
-#: neither a bearing's error nor the speckle of an echo decides. Turns by the network are then off by 0.42 deg on 24
-#: training walks, by 0.45 with three fifths of the Gaussian, and by 0.66 as numbered.
+#: Maximum shift between frames of equal time, frames; rates of its change that are tried, frames per frame.
+MAX_SHIFT, _DRIFTS = 100, np.arange(-0.15, 0.1501, 0.0025)
+#: Number of range rows that are averaged; standard deviations (frames, rows, columns) of the Gaussian that then smooths
+#: bearing errors and speckle. With it, changes of yaw by the network have an RMSE of 0.42 deg on 24 training walks;
+#: with three fifths of these widths 0.45 deg, and matched by frame index 0.66 deg.
 _POOLED, _SMOOTH = 4, (0.0, 1.0, 1.5)
-#: Rows by which the radar reads farther: 0.17 to 0.34 m.
+#: Rows by which the radar's ranges are longer than the lidar's: 0.17 to 0.34 m.
 _FARTHER = 6
-#: Correlation on the line from which on it is believed. Moving walks have 0.29 to 0.36; noise has 0.03.
-_ALIKE = 0.15
-#: Frames of the alternating parts of a walk that are two halves of it, and frames that a walk must have.
+#: Minimum mean correlation on an accepted line. Walks with motion have 0.29 to 0.36; noise has 0.03.
+_LEAST_CORRELATION = 0.15
+#: Length of the alternating parts that make the two halves of a walk, and minimum length of a walk, frames.
 _PART, _LEAST = 100, 300
-#: Share of the frames that a line must meet.
+#: Minimum share of the frames that a line has to cover.
 _MET = 0.6
 
 Pooled = Float[np.ndarray, "frame cell"]
-Alike = Float[np.ndarray, "shift frame"]
+PictureCorrelation = Float[np.ndarray, "shift frame"]
 
 
 @dataclass(frozen=True)
 class Clock:
-    """The lidar's frame that is of the same instant as one of the radar's.
+    """Linear map from frames of the radar to frames of the lidar of the same time.
 
     Attributes:
-        first: for the radar's frame 0.
-        rate: frames of the lidar per frame of the radar.
-        alike: mean correlation of pictures on this line.
-        paired: that of pictures with the same number.
-        doubt: frames by which the lines of two halves of the walk are apart, at most.
+        first: lidar frame at the time of the radar's frame 0.
+        rate: lidar frames per radar frame.
+        correlation: mean correlation of pictures matched by time.
+        correlation_by_index: mean correlation of pictures matched by frame index.
+        halves_differ: largest difference between the maps of the two halves of the walk, frames; NaN if not estimated.
     """
 
     first: float = 0.0
     rate: float = 1.0
-    alike: float = np.nan
-    paired: float = np.nan
-    doubt: float = np.nan
+    correlation: float = np.nan
+    correlation_by_index: float = np.nan
+    halves_differ: float = np.nan
 
     @classmethod
     def of(cls, walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None) -> "Clock":
-        """That of a walk; as it is numbered where its pictures do not tell, for nothing moved or it is too short."""
-        return cls.along(alike(walk, progress))
+        """Estimate the clock of a walk. Frames are matched by index if the walk is too short or without motion."""
+        return cls.fit(picture_correlation(walk, progress))
 
     @classmethod
-    def along(cls, known: Alike) -> "Clock":
-        """The line on which a walk's pictures are most alike."""
+    def fit(cls, known: PictureCorrelation) -> "Clock":
+        """Fit the line of largest mean correlation."""
         frames = known.shape[1]
         if frames < _LEAST:
             return cls()
         drift, late, best = _line(known)
-        paired, middle = float(np.nanmean(known[APART])), (frames - 1) / 2
-        if not best > _ALIKE:
-            return cls(alike=best, paired=paired)
+        by_index, middle = float(np.nanmean(known[MAX_SHIFT])), (frames - 1) / 2
+        if not best > _LEAST_CORRELATION:
+            return cls(correlation=best, correlation_by_index=by_index)
         odd = np.arange(frames) // _PART % 2 == 1
         halves = [_line(np.where(kept, known, np.nan)) for kept in (odd, ~odd)]
         ends = np.array([[late - drift * middle, late + drift * middle] for drift, late, _ in halves])
-        return cls(late - drift * middle, 1 + drift, best, paired, float(np.ptp(ends, axis=0).max()))
+        return cls(late - drift * middle, 1 + drift, best, by_index, float(np.ptp(ends, axis=0).max()))
 
     @property
-    def told(self) -> bool:
-        """Whether pictures tell it."""
-        return bool(np.isfinite(self.doubt))
+    def estimated(self) -> bool:
+        """Whether the clock was estimated from the pictures; else frames are matched by index."""
+        return bool(np.isfinite(self.halves_differ))
 
     def lidar(self, frame: Float[np.ndarray, "frame"] | Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
-        """The lidar's frames, between whole numbers, at those of the radar."""
+        """Convert frames of the radar to fractional frames of the lidar."""
         return self.first + self.rate * frame
 
     def radar(self, frame: Float[np.ndarray, "frame"] | Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
-        """The radar's frames, between whole numbers, at those of the lidar."""
+        """Convert frames of the lidar to fractional frames of the radar."""
         return (frame - self.first) / self.rate
 
     def partners(self, frames: int) -> Int[np.ndarray, "frame"]:
-        """Of a walk, the lidar's frame that is nearest to each of the radar's in time; -1: it has none."""
+        """Return the lidar frame nearest in time to each radar frame of a walk; -1 if the lidar has none."""
         found = np.rint(self.lidar(np.arange(frames))).astype(int)
         return np.where((found >= 0) & (found < frames), found, -1)
 
     def late(self, frames: int) -> tuple[float, float]:
-        """s by which the lidar's picture of a number is later than the radar's, at a walk's start and end."""
+        """Return the delay of the lidar against the radar at equal frame index, at start and end of a walk, s."""
         ends = np.array([0, frames - 1])
         start, end = PERIOD * (ends - self.lidar(ends))
         return float(start), float(end)
 
     def row(self, frames: int) -> dict[str, float]:
-        """What tables say of a walk's clocks."""
+        """Return the row of the table of clocks."""
         start, end = self.late(frames)
         return {
             "start_s": start,
             "end_s": end,
-            "alike by number": self.paired,
-            "alike by instant": self.alike,
-            "halves differ_s": PERIOD * self.doubt,
+            "correlation, by frame index": self.correlation_by_index,
+            "correlation, by time": self.correlation,
+            "halves differ_s": PERIOD * self.halves_differ,
         }
 
 
-def alike(walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None) -> Alike:
-    """Correlation of each picture of the radar with that of the lidar `APART` frames before it, and so on until as many
-    after it; nan: there is none."""
+def picture_correlation(
+    walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None
+) -> PictureCorrelation:
+    """Return the correlation of each radar picture with the lidar pictures from `MAX_SHIFT` frames before it to
+    `MAX_SHIFT` frames after it; NaN where there is no such picture."""
     radar, lidar = _pictures(walk, progress)
     frames = len(radar)
-    found = np.full((2 * APART + 1, frames), np.nan, np.float32)
-    for row, shift in enumerate(range(-APART, APART + 1)):
+    found = np.full((2 * MAX_SHIFT + 1, frames), np.nan, np.float32)
+    for row, shift in enumerate(range(-MAX_SHIFT, MAX_SHIFT + 1)):
         some = np.arange(max(0, -shift), min(frames, frames - shift))
         found[row, some] = np.einsum("ij,ij->i", radar[some], lidar[some + shift])
     return found
 
 
 def _pictures(walk: Walk, progress: Callable[[int, int], None]) -> tuple[Pooled, Pooled]:
-    """What changes in the radar's pictures, and in the lidar's, frame by frame; unit vectors."""
+    """Return the smoothed pictures of radar and lidar without their means over the walk, as unit vectors per frame."""
     radar, lidar = (np.empty((walk.frames, polar.ROWS // _POOLED, polar.COLUMNS), np.float32) for _ in range(2))
     for frame in range(walk.frames):
         radar[frame] = _pooled(walk.radar(frame).astype(np.float32))
@@ -145,13 +147,13 @@ def _changes(pictures: Float[np.ndarray, "frame row column"]) -> Pooled:
     return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-9)
 
 
-def _line(known: Alike) -> tuple[float, float, float]:
-    """Drift (frames per frame), lateness in the middle (frames), and mean of the line on which it is largest; nan: no
-    line meets enough."""
+def _line(known: PictureCorrelation) -> tuple[float, float, float]:
+    """Find the line of largest mean correlation: drift (frames per frame), shift in the middle of the walk (frames),
+    and mean correlation; NaN if no line covers enough frames."""
     rows, frames = known.shape
     padded = np.full((3 * rows, frames), np.nan, np.float32)
     padded[rows : 2 * rows] = known
-    wanted = _MET * np.isfinite(known[APART]).sum()
+    wanted = _MET * np.isfinite(known[MAX_SHIFT]).sum()
     best = (0.0, 0.0, np.nan)
     for drift in _DRIFTS:
         along = np.rint(drift * (np.arange(frames) - (frames - 1) / 2)).astype(int)
@@ -162,5 +164,5 @@ def _line(known: Alike) -> tuple[float, float, float]:
         mean[met < wanted] = -np.inf
         top = int(mean.argmax())
         if np.isfinite(mean[top]) and not mean[top] <= best[2]:
-            best = (float(drift), float(top - APART), float(mean[top]))
+            best = (float(drift), float(top - MAX_SHIFT), float(mean[top]))
     return best

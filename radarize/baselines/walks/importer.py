@@ -1,4 +1,4 @@
-"""A real walk of RadarHD's repository (`radarize.baselines.walks.walks`): pictures of a radar, and a lidar's scans."""
+"""Import of a real walk of RadarHD's repository (`radarize.baselines.walks.walks`): radar pictures and lidar scans."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -17,8 +17,8 @@ from radarize.io.tum import planar_poses
 from radarize.radar.presets import PRESETS
 from radarize.signal import polar
 
-#: s that pictures of one number may be apart before somebody is warned.
-_APART = 0.2
+#: Maximum time between radar and lidar pictures of equal frame index without a warning, s.
+_MAX_OFFSET = 0.2
 
 
 def import_walk(
@@ -30,37 +30,38 @@ def import_walk(
     *,
     align: bool = False,
 ) -> Path:
-    """Write a recording without samples: a picture a frame, and as truth what the lidar saw.
+    """Write a recording without samples: a radar picture per frame, with the lidar's pictures as truth.
 
     Args:
-        data: ``dataset_5`` of a user's clone.
-        number: of the walk.
+        data: folder ``dataset_5`` of a clone of the repository.
+        number: number of the walk.
         output: recording to write.
-        products: poses from elsewhere; by SLAM with the lidar's scans where there are none.
-        progress: called with frames done and in all.
-        align: take as truth the lidar's pictures of the same instants, not of the same numbers
-            (`radarize.baselines.walks.clock`), and leave out the frames of instants that it has none of.
+        products: known poses; without them, poses are estimated by SLAM with the lidar's scans.
+        progress: called with (steps done, steps in all).
+        align: match the lidar's pictures by time instead of frame index (`radarize.baselines.walks.clock`), and leave
+            out frames without a lidar picture of the same time.
 
     Raises:
-        InputError: no such walk, or a picture is missing, damaged, or of another size.
+        InputError: no such walk, or a picture that is missing, damaged, or of another size.
     """
     walk = Walk.find(data, number)
     times, total = stamps(walk.frames), 3 * walk.frames
     clock = Clock.of(walk, lambda done, _: progress(done, total))
     about = {"source": f"RadarHD walk {number} ({walk.folder.name})"}
-    if align and not clock.told:
+    if align and not clock.estimated:
         about["warnings"] = (
-            "--align: pictures do not tell a clock, for they are too few or nothing moved; paired by number"
+            "--align: the clock could not be estimated, because the walk is too short or has no motion; radar and "
+            "lidar are matched by frame index"
         )
     elif align:
-        about["clock"] = f"truth of frame k is of the lidar's picture {clock.first:.2f} + {clock.rate:.4f} k"
-    elif (apart := max(map(abs, clock.late(walk.frames)))) > _APART:
+        about["clock"] = f"truth of frame k is the lidar's picture {clock.first:.2f} + {clock.rate:.4f} k"
+    elif (offset := max(map(abs, clock.late(walk.frames)))) > _MAX_OFFSET:
         about["warnings"] = (
-            f"radar and lidar are numbered alike, but up to {apart:.1f} s apart, so that truth is of other instants: "
-            "--align pairs them by what they see"
+            f"radar and lidar frames of equal index are up to {offset:.1f} s apart, so the truth belongs to other "
+            "times: --align matches them by time"
         )
     if "truth/pose" not in products:
-        about["found"] = "no poses were given: they are by SLAM with the lidar's scans"
+        about["found"] = "no poses were given: they were estimated by SLAM with the lidar's scans"
         poses = planar_poses(lidar_poses(walk, lambda done, _: progress(walk.frames + done, total)))
         products = {
             **products,

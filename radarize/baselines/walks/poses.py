@@ -1,4 +1,4 @@
-"""Where the rig of a real walk was (`radarize.baselines.walks.walks`): given, or by SLAM with the lidar."""
+"""Poses of the rig of a real walk (`radarize.baselines.walks.walks`): from a file, or by SLAM with the lidar."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,22 +15,22 @@ from radarize.signal import polar
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 
-#: Bearings of scans that are made of points.
+#: Bearings of scans made from point clouds, rad.
 BEARINGS = np.radians(np.linspace(-90, 90, 181))
-#: Of so many scans one is taken where nothing says where the sensor went: matching is then a wide search.
+#: Only every N-th scan is used by SLAM without odometry, where scan matching has to search widely.
 EVERY = 2
 
 
 def poses_of(walk: Walk, folder: Path | str | None) -> Float[np.ndarray, "frame 3"]:
-    """`true_poses` of a folder, or `lidar_poses` where there is none."""
+    """Return `true_poses` of a folder, or `lidar_poses` if no folder is given."""
     return true_poses(Path(folder), walk) if folder else lidar_poses(walk)
 
 
 def true_poses(folder: Path, walk: Walk) -> Float[np.ndarray, "frame 3"]:
-    """x, y (m), yaw (rad) of each frame of a walk, from FOLDER/NUMBER.tum, whose times begin with the first frame.
+    """Read x, y (m), yaw (rad) of each frame of a walk from FOLDER/NUMBER.tum, whose time starts at the first frame.
 
     Raises:
-        InputError: no such file, or none for each frame.
+        InputError: no such file, or a frame without a pose.
     """
     path = Path(folder) / f"{walk.number}.tum"
     times, poses = read_tum(path)
@@ -46,7 +46,8 @@ def true_poses(folder: Path, walk: Walk) -> Float[np.ndarray, "frame 3"]:
 def lidar_poses(
     walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Float[np.ndarray, "frame 3"]:
-    """x, y (m), yaw (rad) of each frame by SLAM with the lidar's scans; `progress` takes frames done and in all."""
+    """Estimate x, y (m), yaw (rad) of each frame by SLAM with the lidar's scans; `progress` takes frames done and in
+    all."""
     slam = Slam(SlamConfig.preset("lidar"))
     for frame in range(0, walk.frames, EVERY):
         slam.add_scan(PERIOD * frame, BEARINGS, scan(polar.cartesian(walk.lidar(frame))))
@@ -56,21 +57,21 @@ def lidar_poses(
 
 
 def stamps(frames: int) -> Float[np.ndarray, "frame"]:
-    """Of a walk's frames, s."""
+    """Return the time of each frame of a walk since the first one, s."""
     return PERIOD * np.arange(frames)
 
 
 def at(
     times: Float[np.ndarray, "instant"], known: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 3"]
 ) -> Float[np.ndarray, "instant 3"]:
-    """Poses at some times (s) from those that are known, interpolated."""
+    """Interpolate poses x, y (m), yaw (rad) at some times (s)."""
     columns = poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2])
     x, y, yaw = (np.interp(times, known, column) for column in columns)
     return np.column_stack([x, y, wrap(yaw)])
 
 
-def by_instant(poses: Float[np.ndarray, "frame 3"], clock: Clock) -> Float[np.ndarray, "frame 3"]:
-    """Poses at the instants of the radar's frames, from those of the lidar's; nan where the lidar has none."""
+def matched_by_time(poses: Float[np.ndarray, "frame 3"], clock: Clock) -> Float[np.ndarray, "frame 3"]:
+    """Interpolate the poses of the lidar's frames at the times of the radar's frames; NaN outside of the lidar's."""
     frames = clock.lidar(np.arange(len(poses)))
     found = at(PERIOD * frames, stamps(len(poses)), poses)
     found[(frames < 0) | (frames > len(poses) - 1)] = np.nan
@@ -78,7 +79,7 @@ def by_instant(poses: Float[np.ndarray, "frame 3"], clock: Clock) -> Float[np.nd
 
 
 def scan(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "bearing"]:
-    """Range of the nearest point on each of `BEARINGS`, m; inf where there is none."""
+    """Return the range of the nearest point on each of `BEARINGS`, m; inf on bearings without a point."""
     found = np.full(len(BEARINGS), np.inf)
     bearing = np.arctan2(points[:, 1], points[:, 0])
     column = np.rint((bearing - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])).astype(int)

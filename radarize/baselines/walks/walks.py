@@ -1,7 +1,7 @@
-"""Real walks of RadarHD's repository, as a user's clone has them: pictures of a radar and of a lidar beside it.
+"""Reader of the real walks of RadarHD's repository: pictures of a radar and of a lidar on the same rig.
 
-Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023. The repository has no licence: measure
-with its walks and cite the paper; nothing of them is part of this project.
+Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023. The repository has no licence: users may
+evaluate on a clone of their own and cite the paper; this project contains none of its data.
 
     dataset_5/train|test/radar/R_WALK_FRAME.png      256 x 64, see `radarize.signal.polar`
     dataset_5/train|test/lidar/L_WALK_FRAME.png      256 x 512
@@ -23,22 +23,22 @@ from radarize.io.pixels import read_picture
 from radarize.radar.presets import PRESETS
 from radarize.signal import polar
 
-#: s, from frame to frame.
+#: Time between frames, s.
 PERIOD = PRESETS["radarhd"].frame_period
-#: The authors' measures begin here: their network sees the frames before.
+#: First frame that is evaluated, as by the authors, whose network reads the frames before it.
 FIRST = 40
-#: Bytes of another program's points of a walk, packed or not.
+#: Maximum size of another program's points of a walk, packed or unpacked, bytes.
 _LARGEST = 256 << 20
 
 
 @dataclass(frozen=True)
 class Walk:
-    """A walk of a clone.
+    """A real walk in a clone of the repository.
 
     Attributes:
-        folder: ``train`` or ``test`` of the data set.
-        number: of the walk.
-        frames: how many there are.
+        folder: folder ``train`` or ``test`` of the data set.
+        number: number of the walk.
+        frames: number of frames.
     """
 
     folder: Path
@@ -47,10 +47,10 @@ class Walk:
 
     @classmethod
     def find(cls, data: Path, number: int) -> "Walk":
-        """In a clone's data set.
+        """Find a walk by its number in the data set of a clone.
 
         Raises:
-            InputError: there is none, or pictures are missing.
+            InputError: no such walk, or pictures are missing.
         """
         for part in ("train", "test"):
             folder = Path(data) / part
@@ -65,10 +65,10 @@ class Walk:
 
     @classmethod
     def tests(cls, data: Path) -> "list[Walk]":
-        """All walks that test.
+        """Return all test walks.
 
         Raises:
-            InputError: there are none, or pictures are missing.
+            InputError: no test walks, or pictures are missing.
         """
         numbers = {path.stem.split("_")[1] for path in Path(data).glob("test/radar/R_*_*.png")}
         if not numbers:
@@ -78,7 +78,7 @@ class Walk:
         return [cls.find(data, int(number)) for number in sorted(numbers, key=int)]
 
     def radar(self, frame: int) -> UInt8[np.ndarray, "range azimuth"]:
-        """The radar's picture.
+        """Read the radar's picture of a frame, 0...255.
 
         Raises:
             InputError: missing, damaged, or of another size.
@@ -86,7 +86,7 @@ class Walk:
         return _picture(self.folder / "radar" / f"R_{self.number}_{frame}.png", (polar.ROWS, polar.COLUMNS))
 
     def lidar(self, frame: int) -> Bool[np.ndarray, "range azimuth"]:
-        """Where the lidar has points.
+        """Read the cells of a frame in which the lidar has points.
 
         Raises:
             InputError: missing, damaged, or of another size.
@@ -94,7 +94,7 @@ class Walk:
         return _picture(self.folder / "lidar" / f"L_{self.number}_{frame}.png", (polar.ROWS, polar.BEAMS)) > 0
 
     def batches(self, size: int = 16) -> Iterator[tuple[slice, UInt8[np.ndarray, "frame range azimuth"]]]:
-        """The radar's pictures in batches, with their frames."""
+        """Read the radar's pictures in batches: frames, pictures."""
         for start in range(0, self.frames, size):
             stop = min(start + size, self.frames)
             yield slice(start, stop), np.stack([self.radar(frame) for frame in range(start, stop)])
@@ -109,18 +109,18 @@ def _picture(path: Path, shape: tuple[int, int]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Predictions:
-    """What another program says of walks.
+    """Point clouds that another program estimated on the walks.
 
     Attributes:
-        folder: of ``WALK.npz`` or ``WALK.npz.xz`` (``prediction``, packed bits of frames on the grid of
-            `radarize.signal.polar.GRID`, and ``frame``, their numbers), or of pictures ``...WALK_FRAME.png``, as the
-            lidar's are.
+        folder: folder of ``WALK.npz`` or ``WALK.npz.xz`` (``prediction``: packed bits of each frame on the grid
+            `radarize.signal.polar.GRID`; ``frame``: frame indices), or of pictures ``...WALK_FRAME.png`` in the format
+            of the lidar's pictures.
     """
 
     folder: Path
 
     def points(self, walk: Walk) -> dict[int, Float[np.ndarray, "point 2"]]:
-        """Points (x forward, y left, m) of the frames that it knows; no frames of walks that it does not.
+        """Return points (x forward, y left, m) by frame index; empty for a walk without predictions.
 
         Raises:
             InputError: a damaged file.

@@ -1,8 +1,8 @@
-"""The Radarize data set as its archive has it: a folder of ROS bags, imported as a data set with the paper's splits.
+"""Import of the Radarize data set: a folder of the ROS bags of its archive becomes a data set with the paper's splits.
 
-The archive (Zenodo record 11093859) has bags PLATFORM_BUILDING_PLACE.bag, such as ``cart_csl_upper_0.bag``. Truth is
-the tracking camera's odometry; the label of segmentation comes from the depth camera. The paper's own reference is SLAM
-on both.
+The archive (Zenodo record 11093859) has bags PLATFORM_BUILDING_PLACE.bag, such as ``cart_csl_upper_0.bag``. True poses
+are the odometry of the tracking camera; labels of segmentation are from the depth camera. The paper's reference is SLAM
+with both.
 """
 
 import json
@@ -18,26 +18,26 @@ from radarize.io.replacing import write_whole
 from radarize.io.yamlfile import read_beside
 
 PLATFORMS = {"walk": "handheld", "cart": "cart", "bot": "robot"}
-#: The paper's buildings by the archive's words.
+#: Buildings of the paper by their names in the archive.
 BUILDINGS = {"sc": "A", "csl": "B", "ece": "C", "beckman": "D"}
 _NAME = re.compile(rf"({'|'.join(PLATFORMS)})_({'|'.join(BUILDINGS)})_.+")
 _PARTS = {"t": "train", "v": "validation", "e": "test"}
-#: Of the splits by platform and by building, whose lists are not published, every tenth recording of the training
-#: part validates.
+#: Every N-th training recording is used for validation in the splits by platform and by building, whose lists are not
+#: published.
 _EVERY = 10
 Members = dict[str, list[str]]
 
 
 def bags(folder: Path) -> list[Path]:
-    """The archive's bags in a folder, by name; none of a folder of anything else."""
+    """Return the bags of the archive in a folder, sorted by name; empty for other folders."""
     return sorted(path for path in folder.glob("*.bag") if _NAME.fullmatch(path.stem))
 
 
 def import_archive(folder: Path, output: Path, progress: Callable[[int, int], None]) -> Path:
-    """Import the archive's bags and write ``dataset.json``; bags that are imported already are not again.
+    """Import the bags of the archive and write ``dataset.json``; existing recordings are kept.
 
     Args:
-        folder: of bags.
+        folder: folder of bags.
         output: folder of recordings, one for each bag.
         progress: called with (bags done, bags in all).
 
@@ -45,7 +45,7 @@ def import_archive(folder: Path, output: Path, progress: Callable[[int, int], No
         `output`.
 
     Raises:
-        InputError: no bag of the archive's, or none that can be read.
+        InputError: no bag of the archive, or none that can be read.
     """
     found = bags(folder)
     if not found:
@@ -81,15 +81,16 @@ def _import(bag: Path, output: Path) -> None:
     part.rename(output)
 
 
-#: Kinds of the splits by name.
+#: Kinds of splits by name.
 KINDS = {name: {"kind": name} for name in ("random", "platform", "building")}
 
 
 def splits(names: list[str]) -> dict[str, Members]:
-    """Splits by name: the artefact's five random ones, trained on handheld alone, and with A, B or C held out.
+    """Return splits by name: the five random ones of the artefact, training on handheld recordings only, and A, B or C
+    held out.
 
     Args:
-        names: of the recordings; those that the artefact does not list are in no random split.
+        names: names of the recordings; those that the artefact does not list are in no random split.
     """
     listed = read_beside(__file__)
     words = {name: name.split("_") for name in names}

@@ -1,8 +1,8 @@
-"""What recordings figures are of, and which of them helped to choose settings: figures on these flatter, and every page
-of results says so.
+"""Recordings that results are of, and which of them settings were tuned on: results on these are optimistic, and every
+page of results lists them.
 
-Networks are not among them: each file of weights names its training data. Whoever chooses a setting by looking at
-recordings enters them in ``choices.yaml``.
+Networks are not included: each file of weights names its training data. Enter recordings that a setting is tuned on in
+``choices.yaml``.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,13 @@ Seeds = dict[str, tuple[int | None, ...]]
 
 @dataclass(frozen=True)
 class NamedWalk:
-    """A recording, or a part of one, that figures are of.
+    """A recording that results are of.
 
     Attributes:
-        scene: that it went through.
-        seed: that it was drawn from; None of a real one.
-        metres: in the plane; None where no true poses tell.
-        simulated: or real.
+        scene: name of the scene.
+        seed: seed of a simulated recording; None of a real one.
+        metres: length of the path in the plane, m; None without true poses.
+        simulated: whether it is simulated.
     """
 
     scene: str
@@ -36,7 +36,7 @@ class NamedWalk:
 
     @classmethod
     def of(cls, recording: Recording) -> "NamedWalk":
-        """As a recording says."""
+        """Read the attributes and poses of a recording."""
         about, metres = recording.attributes, None
         if recording.has("truth/pose"):
             places = planar(recording.read("truth/pose"))[:, :2]
@@ -47,18 +47,18 @@ class NamedWalk:
 
     @classmethod
     def radarhd(cls, number: int) -> "NamedWalk":
-        """One of RadarHD's repository."""
+        """Return a walk of RadarHD's repository by its number."""
         return cls(f"radarhd {number}", None, None, False)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Settings, and what they were chosen on.
+    """Settings, and the recordings they were tuned on.
 
     Attributes:
-        settings: in words.
-        recordings: seeds by scene; None: whatever its seed.
-        looked_at: so many of them at most, if nobody knows any more which; 0: all.
+        settings: description of the settings.
+        recordings: seeds by scene; None: any seed.
+        looked_at: maximum number of these recordings that were used, if it is not recorded which; 0: all.
     """
 
     settings: str
@@ -66,13 +66,13 @@ class Choice:
     looked_at: int = 0
 
     def among(self, walks: Sequence[NamedWalk]) -> int:
-        """How many of some recordings may have been looked at."""
+        """Return how many of some recordings the settings may have been tuned on."""
         hits = sum(bool({walk.seed, None} & {*self.recordings.get(walk.scene, ())}) for walk in walks)
         return min(hits, self.looked_at or hits)
 
 
 def _joined(*sets: Seeds) -> Seeds:
-    """The union of sets."""
+    """Return the union of sets."""
     scenes = dict.fromkeys(scene for each in sets for scene in each)
     return {scene: tuple(dict.fromkeys(seed for each in sets for seed in each.get(scene, ()))) for scene in scenes}
 
@@ -83,7 +83,7 @@ def _seeds(walks: dict[str, list[int | None]]) -> Seeds:
 
 def _sets(known: dict[str, dict]) -> dict[str, Seeds]:
     found: dict[str, Seeds] = {}
-    for name, about in known.items():  # those that others are made of come first
+    for name, about in known.items():  # parts of other sets come before them
         own = _seeds({scene: seeds for scene, seeds in about.items() if scene not in ("of", "radarhd")})
         own |= {NamedWalk.radarhd(number).scene: (None,) for number in about.get("radarhd", ())}
         found[name] = _joined(*(found[other] for other in about.get("of", ())), own)
@@ -107,15 +107,15 @@ CHOICES = tuple(
 )
 
 
-def helped(walks: Sequence[NamedWalk]) -> list[str]:
-    """Sentences on which of some recordings helped to choose settings."""
+def tuned_on(walks: Sequence[NamedWalk]) -> list[str]:
+    """Return sentences that list which of some recordings settings were tuned on."""
     found = []
     for choice in CHOICES:
         if count := choice.among(walks):
             most = "at most " if choice.looked_at else ""
-            found.append(f"{most}{count} of {len(walks)} helped to choose {choice.settings}")
+            found.append(f"{most}{count} of {len(walks)} in the tuning set of {choice.settings}")
     scenes = {scene for choice in CHOICES for scene in choice.recordings} & {walk.scene for walk in walks}
     if not found and walks:
-        found = ["none helped to choose settings"]
-        found += [f"other walks through {', '.join(sorted(scenes))} did"] if scenes else []
+        found = ["none in a tuning set"]
+        found += [f"other walks through {', '.join(sorted(scenes))} are"] if scenes else []
     return found

@@ -1,4 +1,4 @@
-"""What methods are compared on: a folder of recordings, and which of them test in each split."""
+"""Data sets of benchmarks: folders of recordings, and the test recordings of each split."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -11,22 +11,22 @@ from radarize.io.jsonfile import read_json
 from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 
-#: Platforms in the order of tables, where a data set has them.
+#: Platforms in the order of the tables.
 PLATFORMS = ("handheld", "cart", "robot")
 
 
 @dataclass(frozen=True)
 class Case:
-    """A recording and what it is of.
+    """A recording of a data set.
 
     Attributes:
-        name: unique in its data set.
-        path: file.
-        building, platform: "-" where the recording does not say.
-        frames: how many it has.
-        config: of its radar.
-        attributes: all that it says of itself.
-        walk: of the sensor.
+        name: name that is unique in the data set.
+        path: file of the recording.
+        building, platform: names; "-" if unknown.
+        frames: number of frames.
+        config: radar configuration.
+        attributes: all attributes of the recording.
+        walk: scene, seed and length of the path.
     """
 
     name: str
@@ -40,10 +40,10 @@ class Case:
 
     @classmethod
     def of(cls, path: Path, name: str | None = None) -> "Case":
-        """Look into a recording, called like its file unless told.
+        """Read the attributes of a recording; its name is by default that of the file.
 
         Raises:
-            InputError: it is none.
+            InputError: not a recording.
         """
         with Recording(path) as recording:
             about, frames, config = recording.attributes, len(recording), recording.config
@@ -54,12 +54,12 @@ class Case:
 
 @dataclass(frozen=True)
 class DataSet:
-    """A folder of recordings, as `radarsim dataset` makes them or any other.
+    """A folder of recordings, made by `radarsim dataset` or otherwise.
 
     Attributes:
-        folder: where.
-        cases: the recordings, by name.
-        index: its ``dataset.json``; empty if it has none.
+        folder: path of the folder.
+        cases: the recordings, sorted by name.
+        index: content of ``dataset.json``; empty without one.
     """
 
     folder: Path
@@ -68,10 +68,10 @@ class DataSet:
 
     @classmethod
     def load(cls, folder: str | Path) -> "DataSet":
-        """Look into a folder; where it has no recordings itself, into the folders in it.
+        """Read the recordings of a folder, or, if it has none, of its subfolders.
 
         Raises:
-            InputError: no recordings, or a file that is none.
+            InputError: no recordings, or a file that is not a recording.
         """
         folder = Path(folder)
         paths = sorted(folder.glob("*.h5")) or sorted(folder.glob("*/*.h5"))
@@ -84,20 +84,20 @@ class DataSet:
         )
 
     def data(self, cases: Iterable[Case]) -> Data:
-        """What figures of some of the recordings are of."""
+        """Return the description of some of the recordings, for a page of results."""
         about = self.index.get("specification", {})
         name = about.get("name", self.folder.resolve().name)
         return Data(name, tuple(case.walk for case in cases), about.get("seed"))
 
     def splits(self, kind: str) -> dict[str, list[Case]]:
-        """Recordings that test in each split of a kind.
+        """Return the test recordings of each split of a kind.
 
         Args:
-            kind: ``random``, ``platform`` (tested on others than trained on) or ``building`` (each held out once).
+            kind: ``random``, ``platform`` (other platforms than in training) or ``building`` (each held out once).
 
         Returns:
-            Name of a split to recordings. Without such splits, what tests is the same: all recordings for ``random``,
-            all but the handheld ones for ``platform``, those of each building for ``building``; ``trainable`` tells.
+            Recordings by name of the split. In a data set without such splits (see ``trainable``): all recordings for
+            ``random``, all but the handheld ones for ``platform``, those of each building for ``building``.
         """
         if self.trainable(kind):
             by_name = {case.name: case for case in self.cases}
@@ -115,11 +115,11 @@ class DataSet:
         return {name: cases for name, cases in found.items() if cases}
 
     def trainable(self, kind: str) -> bool:
-        """Whether the data set says what trains and what tests in splits of a kind."""
+        """Return whether the data set has splits of a kind into training and test recordings."""
         return bool(self._names(kind))
 
     def _names(self, kind: str) -> list[str]:
-        """Splits of a kind; a specification's split NAME of kinds random and building stands for NAME-0, NAME-A ..."""
+        """Return names of the splits of a kind; split NAME of kind random or building becomes NAME-0, NAME-A, ..."""
         kinds = {
             name: about.get("kind") for name, about in self.index.get("specification", {}).get("splits", {}).items()
         }
@@ -129,7 +129,7 @@ class DataSet:
 
 
 def groups(cases: Iterable[Case]) -> dict[str, list[Case]]:
-    """Recordings by platform, then by building, then all."""
+    """Group recordings by platform, then by building, then all."""
     cases = list(cases)
     names = [*PLATFORMS, *dict.fromkeys(case.building for case in cases)]
     found = {name: [case for case in cases if name in (case.platform, case.building)] for name in names if name != "-"}

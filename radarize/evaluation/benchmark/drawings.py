@@ -1,4 +1,4 @@
-"""What a benchmark's page shows below its tables."""
+"""Figures of a benchmark's page, below its tables."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from radarize.evaluation.report import comparison
 from radarize.evaluation.report.page import COLORS, OTHERS, Page
 from radarize.pipeline.runfolder import RunFolder
 
-#: Recordings whose maps are shown.
+#: Number of recordings whose maps are shown.
 _MAPS = 4
 
 
@@ -19,7 +19,15 @@ def draw(
     parts: str = "trajectories errors maps",
     name: Callable[[Pair], str] = str,
 ) -> None:
-    """Parts, of trajectories of a sort (``odometry``, ``slam``), with names of pairs; nothing without any run."""
+    """Add figures of trajectories, errors and maps to a page; nothing without any run.
+
+    Args:
+        study: benchmark that has run.
+        page: page to extend.
+        which: kind of the trajectories, ``odometry`` or ``slam``.
+        parts: figures to draw, some of ``trajectories errors maps``.
+        name: returns the shown name of a pair of methods.
+    """
     runs = {name(pair): found for pair in study.pairs if (found := study.of(pair)["run"].to_list())}
     if not runs:
         return
@@ -32,7 +40,7 @@ def draw(
         for run in found:
             folders.setdefault(run.case.name, {})[method] = RunFolder(study.output / run.place)
             result = study.results[run]
-            assert isinstance(result, dict)  # `Study.of` has runs that ended well
+            assert isinstance(result, dict)  # `Study.of` has successful runs only
             errors[method][run.case.name] = result["quantiles"][which], result[which]["ate"]["position"]["mean"]
     for part in parts.split():
         if part == "trajectories":

@@ -1,4 +1,4 @@
-"""What tells the things that a step is made of from those of an earlier one: sources, recordings, weights."""
+"""Fingerprints of the inputs of a step: source code, recordings, weights. A step is repeated if one has changed."""
 
 import hashlib
 import inspect
@@ -8,18 +8,18 @@ from pathlib import Path
 
 import radarize
 
-#: A file is told from others by its size and so many blocks spread over it, of so many bytes.
+#: The fingerprint of a file is a hash of its size and of a number of blocks spread over it; number and size in bytes.
 _BLOCKS, _BLOCK = 64, 1 << 16
 
 
 @cache
 def of_code(*makers: Callable) -> str:
-    """Of this package's sources, and of the files that methods of one's own are in."""
+    """Return the fingerprint of this package's source code and of the files of external methods."""
     found = _package().copy()
     for maker in makers:
         try:
             own = inspect.getsourcefile(maker.func if isinstance(maker, partial) else maker)
-        except TypeError:  # made in an interpreter
+        except TypeError:  # defined in an interpreter
             continue
         if own and Path(own).is_file():
             found.update(Path(own).read_bytes())
@@ -28,14 +28,15 @@ def of_code(*makers: Callable) -> str:
 
 @cache
 def _package() -> "hashlib._Hash":
-    """Read once for all methods."""
+    """Hash the package once for all methods."""
     root = Path(radarize.__file__).parent
     paths = (path for path in sorted(root.rglob("*")) if path.suffix in (".py", ".yaml"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths))
 
 
 def of_file(path: Path) -> str:
-    """Of a recording or weights; ``none`` without such a file. Recordings differ everywhere, by their noise."""
+    """Return the fingerprint of a recording or of weights; ``none`` without such a file. Blocks suffice, because
+    recordings differ everywhere by their noise."""
     if not path.is_file():
         return "none"
     about = path.stat()
@@ -44,7 +45,7 @@ def of_file(path: Path) -> str:
 
 @cache
 def _of_file(path: Path, size: int, changed: int) -> str:
-    del changed  # what is remembered of a file holds until it changes
+    del changed  # part of the cache key: the cached value is valid until the file changes
     found = hashlib.sha256(str(size).encode())
     with path.open("rb") as file:
         for start in range(0, size, max(_BLOCK, size // _BLOCKS)):

@@ -1,4 +1,4 @@
-"""Scans by every method, what the wrong ones come from, and the maps that SLAM draws of them."""
+"""Benchmark of scans: errors of all methods, path types of wrong returns, and maps of SLAM with these scans."""
 
 import pandas as pd
 
@@ -7,7 +7,7 @@ from radarize.evaluation.benchmark.study import Study
 from radarize.evaluation.benchmark.table import Table
 from radarize.evaluation.stress import FIGURES, SOURCES
 
-#: Columns: where the figure stands in `Study.of`, and its factor.
+#: Columns of the table: path of the metric in `Study.of`, and its factor.
 COLUMNS = {
     "within 10 cm %": ("scans.within_10cm", 100),
     "or of a bearing beside %": ("scans.beside", 100),
@@ -22,19 +22,19 @@ COLUMNS = {
     "SLAM ATE rad": ("slam.ate.rotation.mean", 1),
 }
 NOTES = (
-    "Of returned bearings: within 10 cm of the true planar scan on their own bearing; there or one bearing (1 deg) to "
-    "a side; ghosts left: not within 10 cm, and a ghost is the strongest cause of the cell (provenance); too near by "
-    "over 10 cm, or nothing is there. Of bearings with a surface in reach: returned; through a wall: ending more than "
-    "20 cm behind the surface there and one bearing to a side, for at a glancing angle a degree moves a wall by as "
-    "much.",
-    "Map: F1 and Chamfer distance of occupied cells against the part of the floor plan that true beams met, at 10 cm; "
-    "IoU of free space with what they passed through.",
-    "To reach: 85 % within 10 cm, less than 1 % through a wall, less than 3 % ghosts left.",
+    "Percentages of bearings with a return: within 10 cm of the true planar scan on the same bearing; or on one of the "
+    "bearings beside it (1 deg); ghosts left: error over 10 cm, and the strongest echo of the cell is a ghost in the "
+    "simulation; too near: too short by over 10 cm, or no surface in range. Percentages of bearings with a surface in "
+    "range: returned; through a wall: the return is more than 20 cm behind the surface on this bearing and on those "
+    "beside it, because at a glancing angle one degree moves a wall by as much.",
+    "Map: F1 and Chamfer distance of occupied cells against the part of the floor plan visible to true beams, at "
+    "10 cm; IoU of free space with the area that true beams passed.",
+    "Targets: 85 % within 10 cm, less than 1 % through a wall, less than 3 % ghosts left.",
 )
 
 
 def tables(study: Study) -> list[Table]:
-    """Figures by platform, by building and of all."""
+    """Return the table of metrics by platform, by building and over all recordings."""
     notes = [f"Means over recordings; odometry: {study.chosen.partner.odometry}.", *NOTES]
     paths = {name: path for name, (path, _) in COLUMNS.items()}
     factors = {name: factor for name, (_, factor) in COLUMNS.items()}
@@ -46,5 +46,5 @@ def tables(study: Study) -> list[Table]:
         shares = figures_of(study.of(pair), {name: FIGURES[name].path for name in SOURCES}).mean()
         if shares.notna().any():
             parts = ", ".join(f"{FIGURES[name].words} {100 * share:.1f}" for name, share in shares.items())
-            notes.append(f"{pair.scans}: wrong returns, % of all, come from {parts}.")
+            notes.append(f"{pair.scans}: wrong returns by path type, % of all returns: {parts}.")
     return [Table("Scans and maps", rows, notes)]

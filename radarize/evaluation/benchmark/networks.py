@@ -1,4 +1,4 @@
-"""The networks that methods are run with: those that are shipped, a folder of the user's, or trained for a split."""
+"""Networks of the benchmarked methods: the shipped ones, a folder of the user's, or trained on a split."""
 
 import json
 from collections.abc import Iterable
@@ -17,17 +17,17 @@ from radarize.learning.training.dataset import recordings
 from radarize.learning.training.train import TrainOptions, train
 from radarize.pipeline.method import Weights
 
-#: File with what a training began with, so that no other goes on from its checkpoint.
+#: File with the inputs of a training; its checkpoint is used again only by a training with the same inputs.
 BEGUN = "begun.json"
 
 
 @dataclass(frozen=True)
 class Networks:
-    """Where weights come from.
+    """Source of the weights.
 
     Attributes:
-        label: what runs with them are called: ``shipped``, ``given``, or the split that they were trained on.
-        folder: of the files; None: those that come with the package.
+        label: label of runs with these weights: ``shipped``, ``given``, or the split that they were trained on.
+        folder: folder of the files; None: the shipped ones.
     """
 
     label: str = "shipped"
@@ -35,31 +35,32 @@ class Networks:
 
     @property
     def weights(self) -> Weights:
-        """For methods."""
+        """Weights as input of methods."""
         return Weights(self.folder)
 
     def identity(self, kinds: Iterable[str]) -> dict[str, str]:
-        """What tells the files of some kinds from others."""
+        """Return the fingerprints of the weights of some kinds of network."""
         return {kind: of_file(self.weights.of(kind)) for kind in kinds}
 
     def used(self, kinds: Iterable[str]) -> tuple[UsedNetwork, ...]:
-        """What the files of some kinds say of themselves, those that can be read."""
+        """Return descriptions of the weights of some kinds of network; unreadable files are left out."""
         found = []
         for kind in kinds:
-            with suppress(InputError):  # a method that needs it says why it could not run
+            with suppress(InputError):  # the method that needs it reports the error
                 found.append(UsedNetwork.of(self.weights.of(kind)))
         return tuple(found)
 
 
 @dataclass(frozen=True)
 class Training:
-    """A network of a kind, trained on a split's training part.
+    """Training of a network on the training part of a split.
 
     Attributes:
-        split, kind: of the data set; of network.
+        split: split of the data set.
+        kind: kind of network.
         data: folder of the data set.
-        epochs: at most; None: the task's own.
-        seed: of the training.
+        epochs: maximum number of epochs; None: the default of the task.
+        seed: seed of the training.
     """
 
     split: str
@@ -76,17 +77,17 @@ class Training:
 
     @property
     def frames(self) -> int:
-        """An epoch over ten frames takes about as long as a run over two."""
+        """Duration in frames of a run: an epoch over ten frames takes about as long as a run over two."""
         return self.settings.epochs * len(self._members("train")) * 120
 
     @property
     def settings(self) -> Settings:
-        """The task's own, but for what is asked for; few epochs are for the schedule that makes the most of them."""
+        """Settings of the task, with the given seed and epochs; given epochs use the cosine schedule."""
         own = replace(find_task(self.kind).defaults, seed=self.seed)
         return replace(own, epochs=self.epochs, schedule="cosine") if self.epochs else own
 
     def identity(self) -> dict[str, object]:
-        """All that the network depends on: sources, settings, and what is in the recordings."""
+        """Return fingerprints of everything that the network depends on: source code, settings, recordings."""
         found = {
             "split": self.split,
             "kind": self.kind,
@@ -94,10 +95,10 @@ class Training:
             "code": of_code(),
             **{part: {path.name: of_file(path) for path in self._members(part)} for part in ("train", "validation")},
         }
-        return json.loads(json.dumps(found))  # as it will be read again
+        return json.loads(json.dumps(found))  # as read from the file
 
     def _members(self, part: str) -> list[Path]:
-        """Recordings of a part; none where the training is to say why there are none."""
+        """Return recordings of a part of the split; none if there are none, which the training reports."""
         try:
             return recordings(self.data, self.split, part)
         except InputError:
@@ -106,7 +107,7 @@ class Training:
     def do(self, folder: Path, report: Report) -> dict[str, object]:
         lines: list[str] = []
 
-        def say(line: str) -> None:
+        def log(line: str) -> None:
             lines.append(line)
             report(min(len(lines) / self.settings.epochs, 1.0))
 
@@ -116,7 +117,7 @@ class Training:
             output.with_suffix(".checkpoint").unlink(missing_ok=True)
             write_whole(begun, json.dumps(self.identity(), indent=1))
         try:
-            train(self.kind, self.data, output, self.settings, TrainOptions(self.split, resume=True), log=say)
+            train(self.kind, self.data, output, self.settings, TrainOptions(self.split, resume=True), log=log)
         except InputError as error:
             raise InputError(f"{self.kind} could not be trained: {error}") from error
         return {"log": lines}

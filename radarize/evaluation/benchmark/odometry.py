@@ -1,4 +1,4 @@
-"""Odometry by every method: trajectories (the paper's tables 2 and 3), velocities, turns, claimed uncertainties."""
+"""Benchmark of odometry: trajectories (the paper's tables 2 and 3), velocities, changes of yaw, and NEES."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from radarize.evaluation.benchmark.followed import FrameErrors, joined, turn_nees, turned
+from radarize.evaluation.benchmark.frame_errors import FrameErrors, joined, joined_yaw_errors, yaw_nees
 from radarize.evaluation.benchmark.protocol import figures_of
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Study
@@ -15,7 +15,7 @@ from radarize.evaluation.benchmark.trajectories import trajectory_tables
 from radarize.evaluation.metrics import Statistics
 from radarize.evaluation.motion import velocity_errors
 
-#: s: span that the paper's network tells a turn over.
+#: Time span of a change of yaw of the paper's network, s.
 WINDOW = 4 / 15
 #: The paper's tables 2 and 3: ATE in m and rad, RE between frames in m.
 PAPER: dict[str, tuple[float, ...]] = {
@@ -30,32 +30,32 @@ PAPER_PLATFORMS: dict[str, tuple[float, ...]] = {
     "learned": (1.121, 0.565, 0.013),
     "fused": (1.121, 0.565, 0.013),
 }
-#: Columns: where the figure stands in `Study.of`.
+#: Columns of the table: path of the metric in `Study.of`.
 ABSOLUTE = {"ATE m": "odometry.ate.position.mean", "ATE rad": "odometry.ate.rotation.mean"}
 RELATIVE = {
     f"RE per {span}, m, rad": {kind: f"odometry.re.{span}.{kind}.mean" for kind in ("position", "rotation")}
     for span in ("frame", "second", "metre")
 }
 NOTES = (
-    "ATE: mean error after alignment without scale, mean over trajectories; RE: true relative errors, means. Bias: "
-    "along the motion, positive: too fast.",
-    "NEES: squared error over the claimed variance, per dimension, 1 if that is right; in brackets the median over its "
-    "expectation.",
-    "To reach: ATE 0.4 m and 0.18 rad, on unseen platforms 0.56 m and 0.28 rad; velocity RMSE 0.05 m/s, yaw over "
+    "ATE: mean error after alignment without scale, mean over trajectories; RE: mean relative errors. median, 90 %, "
+    "bias: of the velocity error, m/s; the bias is along the motion, positive: estimated too fast.",
+    "NEES: normalised estimation error squared per dimension, 1 if covariances are consistent; in brackets the median "
+    "over its expectation.",
+    "Targets: ATE 0.4 m and 0.18 rad, on unseen platforms 0.56 m and 0.28 rad; velocity RMSE 0.05 m/s, yaw over "
     "0.27 s 1 deg, NEES 0.8 to 1.25.",
 )
-SEEN = "Shipped networks learned from walks by hand, by cart and by robot; with --train none has seen these platforms."
+SEEN = "Shipped networks were trained on handheld, cart and robot walks; with --train not on these platforms."
 
 
 def tables(study: Study, paper: dict[str, tuple[float, ...]] = PAPER) -> list[Table]:
-    """Trajectories by each protocol; figures of all frames, by platform and building."""
+    """Return tables of trajectory errors by each protocol, and of frame errors by platform and building."""
     known = {pair: paper[pair.odometry] for pair in study.pairs if pair.odometry in paper}
     labels: dict[Pair, dict[str, object]] = {pair: {"odometry": pair.odometry} for pair in study.pairs}
     return [*trajectory_tables(study, "odometry", labels, known, "Odometry"), steps_table(study)]
 
 
 def platform_tables(study: Study) -> list[Table]:
-    """As `tables`, beside the paper's figures, whose networks had seen the handheld platform alone."""
+    """Return `tables` with the paper's figures for networks that were trained on the handheld platform only."""
     found = tables(study, PAPER_PLATFORMS)
     if study.options.shipped:
         found[0].notes.append(SEEN)
@@ -63,7 +63,7 @@ def platform_tables(study: Study) -> list[Table]:
 
 
 def steps_table(study: Study) -> Table:
-    """Figures of all frames, by platform, by building and of all."""
+    """Return the table of frame errors by platform, by building and over all recordings."""
     read = cache(lambda run: FrameErrors.read(study.output / run.place))
     rows = [
         {"odometry": pair.odometry, **group, **row(runs, list(map(read, runs["run"])))}
@@ -73,8 +73,8 @@ def steps_table(study: Study) -> Table:
 
 
 def row(runs: pd.DataFrame, found: Sequence[FrameErrors]) -> dict[str, object]:
-    """Figures of several recordings: of all their frames, and means over trajectories."""
-    frames, turns = joined(found), Statistics.of(turned(found, WINDOW)[0])
+    """Return a row of metrics of several recordings: over all frames, and means over trajectories."""
+    frames, turns = joined(found), Statistics.of(joined_yaw_errors(found, WINDOW)[0])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     relative = {name: figures_of(runs, columns).mean() for name, columns in RELATIVE.items()}
     known = np.isfinite(velocity["nees"])
@@ -87,6 +87,6 @@ def row(runs: pd.DataFrame, found: Sequence[FrameErrors]) -> dict[str, object]:
         **figures_of(runs, ABSOLUTE).mean(),
         **{name: ", ".join(f"{value:.4f}" for value in values) for name, values in relative.items()},
         "NEES velocity (median)": with_median(velocity["nees"], velocity["nees_median"]) if known else None,
-        "NEES yaw step": turn_nees(found, 0),
-        "NEES yaw over 0.27 s": turn_nees(found, WINDOW),
+        "NEES yaw step": yaw_nees(found, 0),
+        "NEES yaw over 0.27 s": yaw_nees(found, WINDOW),
     }

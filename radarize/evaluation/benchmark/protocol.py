@@ -1,6 +1,6 @@
-"""How errors of trajectories become one figure: as in the paper (section 6 and its artefact), and its slips mended.
+"""Evaluation protocols for trajectories: that of the paper (section 6 and its artefact), and a corrected one.
 
-All that a protocol means stands here, for every table: association, means, relative errors, and loop closure.
+A protocol defines association, averages, relative errors and loop closure for all tables.
 """
 
 from dataclasses import dataclass
@@ -9,22 +9,22 @@ import pandas as pd
 
 from radarize.evaluation.benchmark.runs import Pair
 
-#: Odometry of the paper's method, as published, re-implemented and improved: what the others are compared with.
+#: Odometry of the paper's method: improved, re-implemented, and as published.
 OURS = ("fused", "learned", "published")
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """A way to compare trajectories.
+    """A protocol of trajectory errors.
 
     Attributes:
-        title: what tables call it.
-        note: what it does.
-        association: part of `runs.figures` that holds its errors, with a dot; "": the whole.
-        relative: spans that relative errors are shown over.
-        by_split: a mean over splits of means over their recordings, in which a recording counts as often as it tests;
-            else each recording counts once with each set of networks.
-        closing: odometry whose loops the back end closes; empty: all.
+        title: name in titles of tables.
+        note: description.
+        association: prefix of its errors in `runs.figures`, with a dot; empty for the top level.
+        relative: spans of the relative errors.
+        by_split: average over splits of averages over their recordings, so that a recording counts once per split in
+            which it is tested; else each recording counts once with each set of networks.
+        closing: methods of odometry with loop closure; empty: all.
     """
 
     title: str
@@ -36,13 +36,13 @@ class Protocol:
 
     @property
     def loops(self) -> str:
-        """Whose loops are closed, as a sentence."""
+        """Sentence on the methods of odometry with loop closure."""
         if not self.closing:
             return "One back end with the same settings for all."
-        return f"Loops are closed for {', '.join(self.closing)} alone: the paper's baselines ran without."
+        return f"Loop closure for {', '.join(self.closing)} only, because the paper's baselines have none."
 
     def columns(self, pair: Pair, trajectory: str) -> dict[str, str]:
-        """Columns of a table to paths of figures, of a trajectory: ``odometry`` or ``slam``."""
+        """Return the columns of a table, and the paths of their metrics, for a trajectory: ``odometry`` or ``slam``."""
         if trajectory == "slam" and self.closing and pair.odometry not in self.closing:
             trajectory = "open"
         found = {"ATE m": "ate.position", "ATE rad": "ate.rotation"}
@@ -51,7 +51,7 @@ class Protocol:
         return {name: f"{self.association}{trajectory}.{path}.mean" for name, path in found.items()}
 
     def average(self, runs: pd.DataFrame, pair: Pair, trajectory: str) -> dict[str, float]:
-        """Figures of a pair over some of its runs (rows of `Study.of`, once a split): columns to values, or NaN."""
+        """Average the metrics of a pair over runs (rows of `Study.of`, once per split): values by column, or NaN."""
         columns = self.columns(pair, trajectory)
         figures = figures_of(runs, columns)
         if self.by_split:
@@ -60,27 +60,27 @@ class Protocol:
 
 
 def figures_of(runs: pd.DataFrame, columns: dict[str, str]) -> pd.DataFrame:
-    """Columns of a table, of paths in `Study.of`; NaN where there are none."""
+    """Select the columns of a table by their paths in `Study.of`; NaN for missing metrics."""
     return runs.reindex(columns=list(columns.values())).set_axis(list(columns), axis=1).astype(float)
 
 
 PROTOCOLS = {
     "paper": Protocol(
         "the paper's protocol",
-        "The paper's protocol: estimates are compared with the reference's nearest pose within 10 ms after alignment "
+        "The paper's protocol: estimates are compared with the reference's nearest pose within 10 ms, after alignment "
         "without scale; mean error of a trajectory, mean over trajectories, mean over splits. RE: between consecutive "
-        "frames. Its RE of rotation is no relative error (it follows n / (n + 1) of ATE, a slip of the evaluation's "
-        "scripts) and not repeated; its reference was SLAM on depth scans, ours is the true path.",
+        "frames. The paper's RE of rotation is not a relative error (its scripts compute n / (n + 1) of ATE) and is "
+        "not repeated. The paper's reference is SLAM on depth scans; ours is the true trajectory.",
         association="nearest.",
         relative=("frame",),
         by_split=True,
         closing=OURS,
     ),
-    "mended": Protocol(
-        "slips mended",
-        "Slips mended: the reference is interpolated to the estimate's stamps, every recording counts once with each "
-        "set of networks, relative errors are true ones over a frame, a second and a metre, and the back end treats "
-        "all methods alike.",
+    "corrected": Protocol(
+        "corrected protocol",
+        "Corrected protocol: the reference is interpolated at the time stamps of the estimate, every recording counts "
+        "once with each set of networks, relative errors are over a frame, a second and a metre, and all methods have "
+        "loop closure.",
         association="",
         relative=("frame", "second", "metre"),
         by_split=False,

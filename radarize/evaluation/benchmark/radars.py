@@ -1,4 +1,4 @@
-"""The same networks on several radars: walks that all of them see alike (data set `radars`)."""
+"""Benchmark of the same networks on several radars, on the same walks (data set `radars`)."""
 
 import pandas as pd
 
@@ -9,9 +9,9 @@ from radarize.evaluation.benchmark.study import Chosen, Study
 from radarize.evaluation.benchmark.table import Table, with_error
 from radarize.pipeline.methods import BEST, CLASSICAL, best_methods
 
-#: Attribute that says which radar saw a recording.
+#: Attribute of a recording with the name of its radar.
 CHIRPS = "chirps"
-#: Columns with means and their standard errors over walks, and columns with means in %, by paths of `Study.of`.
+#: Columns with means +- standard errors over walks, and columns with means in %: paths of the metrics in `Study.of`.
 MEANS = {
     "odometry m": "odometry.ate.position.mean",
     "odometry rad": "odometry.ate.rotation.mean",
@@ -19,15 +19,16 @@ MEANS = {
 }
 SHARES = {"map F1 %": "map.f1", "returned %": "scans.returned", "within 10 cm %": "scans.within_10cm"}
 NOTES = (
-    "Every walk is made once for each radar, with the same seed and scatterers. Means over walks and their standard "
-    "errors. Returned: of bearings with a surface in the radar's reach, so the farther a radar sees, the more it has "
-    "to return. Within 10 cm: of returned bearings.",
-    "chosen: what `radarize run` takes for that radar if nothing is asked for.",
+    "Every walk is simulated once for each radar, with the same seed and scatterers. odometry m, odometry rad, SLAM m: "
+    "mean ATE +- standard error over walks. returned %: of bearings with a surface within the radar's maximum range, "
+    "which is larger for long-range radars. within 10 cm %: of bearings with a return.",
+    "chosen: default methods of `radarize run` for the radar.",
 )
 
 
 def pairs(chosen: Chosen) -> list[Pair]:
-    """Neither with networks, scans alone, and both; or what was asked for instead."""
+    """Return pairs of methods: both without networks, scans with a network, and both with networks; or the requested
+    ones."""
     without, best = Pair(**CLASSICAL), Pair(**BEST)
     usual = dict.fromkeys([without, Pair(without.odometry, best.scans), best])
     wanted = [pair for pair in usual if pair.odometry in chosen.odometry and pair.scans in chosen.scans]
@@ -35,14 +36,14 @@ def pairs(chosen: Chosen) -> list[Pair]:
 
 
 def lacks(data: DataSet) -> str:
-    """What a data set must have and has not: recordings that say which radar it was."""
+    """Return a sentence if no recording of a data set has the name of its radar; else an empty string."""
     if any(CHIRPS in case.attributes for case in data.cases):
         return ""
     return f"no recording has an attribute {CHIRPS}, expected a data set such as that of `radarsim dataset radars`"
 
 
 def tables(study: Study) -> list[Table]:
-    """Figures by radar and pair of methods."""
+    """Return the table of metrics by radar and pair of methods."""
     radars = {case.attributes[CHIRPS]: case.config for case in study.data.cases if CHIRPS in case.attributes}
     found = {pair: study.of(pair) for pair in study.pairs}
     rows = []

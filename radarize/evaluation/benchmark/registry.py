@@ -1,7 +1,7 @@
 """The benchmarks of `radarize benchmark NAME`: entry points of the group ``radarize.benchmarks``.
 
-Any package may add one: a `Benchmark` with a `pairs` and a `tables`. Methods of `radarize.pipeline.methods` appear in
-all of them.
+Any package can add a `Benchmark` with functions `pairs` and `tables`. Methods of `radarize.pipeline.methods` are
+available in all of them.
 """
 
 from functools import partial
@@ -22,7 +22,7 @@ ODOMETRY = Benchmark(
 )
 ODOMETRY_PLATFORMS = Benchmark(
     "Odometry on other platforms",
-    "Tested on platforms that, with --train, no training saw (the paper's table 3).",
+    "Trajectories by odometry on platforms that, with --train, are not in the training (the paper's table 3).",
     Chosen.by_odometry,
     odometry.platform_tables,
     "platform",
@@ -38,7 +38,7 @@ SLAM = Benchmark(
 )
 BUILDINGS = Benchmark(
     "SLAM in unseen buildings",
-    "Tested in buildings that, with --train, no training saw (the paper's table 5).",
+    "Trajectories by SLAM in buildings that, with --train, are not in the training (the paper's table 5).",
     Chosen.by_odometry,
     slam.building_tables,
     "building",
@@ -46,7 +46,7 @@ BUILDINGS = Benchmark(
 )
 WALKS = Benchmark(
     "Odometry and SLAM on test walks",
-    "Errors of each method, whether it knows them, and the walks where SLAM is worst.",
+    "Errors and NEES of each method on test walks, and the walks with the largest errors of SLAM.",
     walks.pairs,
     walks.tables,
     "random",
@@ -55,14 +55,14 @@ WALKS = Benchmark(
 )
 RUNTIME = Benchmark(
     "Run time",
-    "Milliseconds per frame of every stage (the paper's table 6).",
+    "Run time of every stage, ms per frame (the paper's table 6).",
     runtime.pairs,
     runtime.tables,
     timed=True,
 )
 MAPPING = Benchmark(
     "Scans and maps",
-    "Scans against true surfaces, what wrong ones come from, and maps against the floor plan.",
+    "Errors of scans against true surfaces, path types of wrong returns, and maps against the floor plan.",
     Chosen.by_scans,
     mapping.tables,
     "random",
@@ -70,7 +70,7 @@ MAPPING = Benchmark(
 )
 MULTIPATH = Benchmark(
     "Multipath",
-    "Ghosts, missed surfaces, maps and odometry as multipath becomes severe (data set `stress`).",
+    "Ghosts, missed surfaces, maps and odometry over the severity of multipath (data set `stress`).",
     varied.stress_pairs,
     varied.stress_tables,
     lacks=varied.STRESS.lacks,
@@ -79,14 +79,14 @@ MULTIPATH = Benchmark(
 )
 RADARS = Benchmark(
     "Other radars",
-    "Networks of one radar on others, beside methods without networks (data set `radars`).",
+    "Networks trained for one radar on other radars, and methods without networks (data set `radars`).",
     radars.pairs,
     radars.tables,
     lacks=radars.lacks,
 )
 ABLATION = Benchmark(
     "Ablations",
-    "Which radar would do better: classical methods over values of its parameters (data sets `ablation/...`).",
+    "Methods without networks over parameters of the radar and its mounting (data sets `ablation/...`).",
     varied.classical_pairs,
     varied.ablation_tables,
     lacks=varied.ABLATION.lacks,

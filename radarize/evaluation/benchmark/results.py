@@ -1,8 +1,7 @@
-"""What is published of a comparison: tables as JSON and Markdown, and beside them all that tells what they are worth.
+"""Results of benchmarks: tables as JSON and Markdown, with their provenance.
 
-A page says by construction what its figures are of (data, walks, simulated or real, which of it helped to choose
-settings), what networks they were taken with, and what made it (command, version, commit, machine): results without
-that are refused.
+Every page states its data (recordings, simulated or real, members of tuning sets), its networks, and how it was made
+(command, version, commit, machine). Results without them are refused.
 """
 
 import os
@@ -18,7 +17,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from radarize import __version__
-from radarize.evaluation.benchmark.choices import NamedWalk, helped
+from radarize.evaluation.benchmark.choices import NamedWalk, tuned_on
 from radarize.evaluation.benchmark.table import Table
 from radarize.io.errors import explained
 from radarize.io.recording import Recording
@@ -28,12 +27,12 @@ from radarize.learning.nets.weights import header_of, read
 
 @dataclass(frozen=True)
 class Data:
-    """What figures are of.
+    """Data that results are of.
 
     Attributes:
-        name: of the data set, or what else it is in words.
-        walks: recordings; none where figures are of no walks.
-        seed: that all of it was drawn from; None if it does not say.
+        name: name of the data set, or a description.
+        walks: recordings; empty if results are not of walks.
+        seed: seed of the data set; None if unknown.
     """
 
     name: str
@@ -42,10 +41,10 @@ class Data:
 
     @classmethod
     def of(cls, name: str, paths: Sequence[Path], seed: int | None = None) -> "Data":
-        """Of recordings.
+        """Describe recordings.
 
         Raises:
-            InputError: unreadable ones.
+            InputError: an unreadable recording.
         """
         walks = []
         for path in paths:
@@ -55,7 +54,7 @@ class Data:
 
     @property
     def sentence(self) -> str:
-        """Name, n, path, simulated or real, seed, and what of it helped to choose settings."""
+        """Name, number, path length, simulated or real, seed, and members of tuning sets."""
         parts = [self.name, f"{len(self.walks)} recordings" if self.walks else "no recordings"]
         if self.walks:
             known = [walk.metres for walk in self.walks if walk.metres is not None]
@@ -65,18 +64,20 @@ class Data:
             kinds = {len(self.walks): "all simulated", 0: "all real"}
             parts.append(kinds.get(simulated, f"{simulated} simulated, {len(self.walks) - simulated} real"))
         parts += [] if self.seed is None else [f"seed {self.seed}"]
-        return "; ".join([", ".join(parts), *helped(self.walks)])
+        return "; ".join([", ".join(parts), *tuned_on(self.walks)])
 
 
 @dataclass(frozen=True)
 class UsedNetwork:
-    """A trained network that figures were taken with.
+    """A trained network that was used for results.
 
     Attributes:
-        kind: of network.
-        parameters: how many.
-        data, split: that it was trained on; epochs: of the training.
-        width: channels of its first stage; hours: of walks that it learned from; 0 where a page is older than that.
+        kind: kind of network.
+        parameters: number of parameters.
+        data, split: data set and split of the training.
+        epochs: epochs of the training.
+        width: channels of the first stage; 0 if unknown.
+        hours: duration of the training data, h; 0 if unknown.
     """
 
     kind: str
@@ -89,16 +90,16 @@ class UsedNetwork:
 
     @classmethod
     def of(cls, path: Path) -> "UsedNetwork":
-        """As a file of weights says.
+        """Read the header of a file of weights.
 
         Raises:
             InputError: unreadable.
         """
         tensors, _ = read(path)
-        # What normalisation counts while it is trained is in the file, too.
+        # The file contains the running statistics of normalisation layers, too.
         counted = [v.numel() for name, v in tensors.items() if "running_" not in name and "num_batches" not in name]
-        said = header_of(path)
-        return cls(said.kind, sum(counted), said.data or "-", said.split, said.epochs, said.width, said.hours)
+        about = header_of(path)
+        return cls(about.kind, sum(counted), about.data or "-", about.split, about.epochs, about.width, about.hours)
 
     @property
     def sentence(self) -> str:
@@ -111,7 +112,7 @@ class UsedNetwork:
 
 @cache
 def machine() -> dict[str, str]:
-    """Processor, cores and software that figures are taken with; of the first call, for sources may change later."""
+    """Return processor, cores and software versions, as of the first call, because sources may change during a run."""
     try:
         model = next(x for x in Path("/proc/cpuinfo").read_text().splitlines() if x.startswith("model name"))
         model = model.split(":", 1)[1].strip()
@@ -127,7 +128,7 @@ def machine() -> dict[str, str]:
 
 
 def commit(source: Path) -> str:
-    """Of the checkout that a source file is of, and whether its sources are those of the commit."""
+    """Return the commit of the checkout that a source file is in, and whether files differ from it."""
 
     def git(*words: str) -> str | None:
         try:
@@ -137,7 +138,7 @@ def commit(source: Path) -> str:
         return done.stdout.strip() if done.returncode == 0 else None
 
     root = source.parent
-    if not git("ls-files", "--error-unmatch", source.name):  # installed, perhaps below another project's checkout
+    if not git("ls-files", "--error-unmatch", source.name):  # installed, possibly inside another project's checkout
         return "not a checkout"
     top = git("rev-parse", "--show-toplevel")
     assert top is not None  # git has just answered
@@ -149,8 +150,7 @@ def commit(source: Path) -> str:
 
 
 def command(name: str, words: Sequence[str] | None = None) -> str:
-    """A program's name with its arguments, those of this process unless told; folders are the machine's business, not
-    the reader's."""
+    """Return a program's name with its arguments, by default those of this process, without absolute folders."""
     words = [
         Path(word).name if Path(word).is_absolute() else word for word in (sys.argv[1:] if words is None else words)
     ]
@@ -159,19 +159,19 @@ def command(name: str, words: Sequence[str] | None = None) -> str:
 
 @dataclass(frozen=True)
 class Results:
-    """Tables and how they came about.
+    """Tables with their provenance.
 
     Attributes:
         title: heading.
-        tables: one or several.
-        data: what they are of.
-        networks: that they were taken with.
-        command: that makes them.
-        notes: what holds for all of them.
-        machine: see `machine`.
+        tables: one or more tables.
+        data: data of the results.
+        networks: networks that were used.
+        command: command that makes the results.
+        notes: notes on all tables.
+        machine: result of `machine`.
 
     Raises:
-        ValueError: anything of that is missing.
+        ValueError: one of them is missing.
     """
 
     title: str
@@ -185,13 +185,13 @@ class Results:
     def __post_init__(self):
         for name, kind in (("data", Data), ("networks", tuple), ("command", str)):
             if not isinstance(getattr(self, name), kind):
-                raise ValueError(f"{self.title}: has no {name}, expected a page that says what it is of")
+                raise ValueError(f"{self.title}: has no {name}, expected results with their provenance")
         if missing := {"processor", "cores", "version", "commit"} - self.machine.keys():
             raise ValueError(f"{self.title}: its machine lacks {', '.join(sorted(missing))}")
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the figures are worth, by name."""
+        """Provenance of the results, by name."""
         beside = dict.fromkeys(each for table in self.tables for each in table.beside)
         return {
             "Data": self.data.sentence,
@@ -202,7 +202,7 @@ class Results:
         }
 
     def markdown(self) -> str:
-        """The whole as text; a single table of the same title has no heading of its own."""
+        """Return the results as Markdown; a single table with the title of the page has no heading of its own."""
         lone = len(self.tables) == 1 and self.tables[0].title == self.title
         parts = [table.markdown(1 if lone else 2) for table in self.tables]
         parts = parts if lone else [f"# {self.title}\n", *parts]
@@ -211,16 +211,16 @@ class Results:
 
     @classmethod
     def read(cls, path: Path) -> "Results":
-        """Of what `write` wrote.
+        """Read a JSON file of `write`.
 
         Raises:
-            InputError: unreadable, or of another layout.
+            InputError: an unreadable file, or another layout.
         """
         with explained(f"{path}: is no page of results as this version writes them", OSError, ValueError):
             return TypeAdapter(cls).validate_json(path.read_bytes())
 
     def write(self, folder: Path, name: str) -> Path:
-        """Write NAME.json and NAME.md, and return the latter's path.
+        """Write NAME.json and NAME.md, and return the path of the latter.
 
         Raises:
             InputError: they cannot be written.
@@ -230,7 +230,7 @@ class Results:
         return write_whole(folder / f"{name}.md", self.markdown())
 
     def save(self, path: Path) -> Path:
-        """Write all of it as JSON.
+        """Write the results as JSON.
 
         Raises:
             InputError: it cannot be written.

@@ -1,4 +1,4 @@
-"""`radarize benchmark`: compare methods on a folder of recordings and publish what came of it."""
+"""`radarize benchmark`: compare methods on a folder of recordings, and write tables and pages."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ from radarize.io.errors import InputError
 from radarize.io.jsonfile import read_json
 from radarize.io.replacing import replacing
 
-#: All that the data is fit for.
+#: Name for all benchmarks that the data is suitable for.
 ALL = "all"
 
 
@@ -26,30 +26,30 @@ def benchmark(
     options: Options = Options(),  # noqa: B008
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    say: Callable[[str], None] = lambda line: None,
+    log: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Results]:
-    """Compare methods. Whatever ends it, the same call goes on after the last run that ended.
+    """Compare methods. If it is interrupted, the same call continues after the last run that has ended.
 
     Args:
         name: a key of `BENCHMARKS`, or ``all``.
-        data: folder of recordings, or of the Radarize data set's bags, which are imported to `output`/recordings.
-        output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark (NAME.png where it has curves),
-            index.html over all; ``runs``, ``timings`` and ``weights``, which are used again.
-        options: what is compared, and with what.
+        data: folder of recordings, or of bags of the Radarize data set, which are imported to `output`/recordings.
+        output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark (NAME.png if it has plots), and
+            index.html; ``runs``, ``timings`` and ``weights``, which are used again.
+        options: methods, networks and protocol.
         progress: called with (frames done, frames in all).
-        say: takes a line on each benchmark that the data is not fit for.
+        log: called with a line for each benchmark that the data is not suitable for.
 
     Returns:
-        what was published, by name.
+        Results by name.
 
     Raises:
-        InputError: an unknown name, or data that is not fit for it.
+        InputError: an unknown name, or data that is not suitable.
     """
     known = {each: of for each, of in BENCHMARKS.items() if isinstance(of, Benchmark)}
     if name != ALL and name not in known:
         raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*known, ALL))}")
     options.check()
-    machine()  # as things are now: sources may change while it runs
+    machine()  # read now, because sources may change during a long run
     output = Path(output)
     if bags(Path(data)):
         data = import_archive(Path(data), output / "recordings", progress)
@@ -61,9 +61,9 @@ def benchmark(
         except InputError as error:
             if name != ALL:
                 raise
-            say(f"{each}: left out, {error}")
+            log(f"{each}: left out, {error}")
     if not studies:
-        raise InputError(f"{data}: is fit for no benchmark")
+        raise InputError(f"{data}: is not suitable for any benchmark")
     carry_out(list(studies.values()), progress)
     published = {each: _publish(each, study) for each, study in studies.items()}
     write_index(output)
@@ -83,7 +83,7 @@ def _publish(name: str, study: Study) -> Results:
 
 
 def write_page(study: Study, results: Results, path: Path) -> Path:
-    """Tables that sort on click, then the benchmark's drawings.
+    """Write a page with sortable tables, and the figures of the benchmark.
 
     Raises:
         InputError: it cannot be written, or a run's file is damaged.
@@ -106,7 +106,7 @@ def write_page(study: Study, results: Results, path: Path) -> Path:
 
 
 def write_index(folder: Path) -> Path:
-    """A page that leads to those of a folder.
+    """Write an index of the pages of a folder.
 
     Raises:
         InputError: it cannot be written.

@@ -1,4 +1,4 @@
-"""A recording by a pair of methods: the run, and its figures; and how long each stage takes."""
+"""Steps of a benchmark: a run of a pair of methods on a recording with its metrics, and its run time by stage."""
 
 import time
 from dataclasses import dataclass
@@ -24,17 +24,17 @@ from radarize.signal.batch import Preprocessor
 from radarize.signal.effort import BATCH
 from radarize.slam.config import LoopConfig, SlamConfig
 
-#: Folder in a run's with the back end's result where no loops were closed.
+#: Subfolder of a run with the result of the back end without loop closure.
 OPEN = "without-loops"
-#: Errors of a trajectory are kept as so many quantiles.
+#: Number of quantiles of the position errors that are kept.
 QUANTILES = 101
-#: Frames that are timed.
+#: Number of frames whose run time is measured.
 TIMED = 300
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Methods of odometry and of scans, keys of `radarize.pipeline.methods.ODOMETRY` and `SCANS`."""
+    """A method of odometry and one of scans: keys of `radarize.pipeline.methods.ODOMETRY` and `SCANS`."""
 
     odometry: str
     scans: str
@@ -44,7 +44,7 @@ class Pair:
 
     @property
     def networks(self) -> tuple[str, ...]:
-        """Kinds of weights that they need."""
+        """Kinds of network that the methods need."""
         return tuple(dict.fromkeys((*ODOMETRY[self.odometry].networks, *SCANS[self.scans].networks)))
 
 
@@ -69,7 +69,7 @@ class _Step:
 
 @dataclass(frozen=True)
 class RunStep(_Step):
-    """The pipeline on a recording: a folder as `radarize run` writes it, and one without loop closure in it."""
+    """Run of the pipeline on a recording: the folder of `radarize run`, with a subfolder without loop closure."""
 
     alone = False
 
@@ -82,8 +82,8 @@ class RunStep(_Step):
         return self.case.frames
 
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """See `figures`."""
-        share = 0.7  # of the time, until trajectories are there
+        """Run the pipeline, and return `figures`."""
+        share = 0.7  # of the time is spent on the trajectories
         with Recording(self.case.path) as recording:
             run_recording(
                 recording[:], folder, {"odometry": self.pair.odometry, "scans": self.pair.scans},
@@ -93,15 +93,15 @@ class RunStep(_Step):
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:
-    """All figures of a run of a recording; None for numbers that do not exist.
+    """Compute all metrics of a run of a recording; None for values that do not exist.
 
     Returns:
-        What `evaluate` returns, and ``nearest``: `TrajectoryErrors.summary` of ``odometry``, ``slam`` and ``open``
-        (without loop closure) by the paper's association; ``quantiles``: of the same trajectories' position errors, m;
-        ``sources`` and ``missed``: see `radarize.evaluation.stress`, where the recording knows.
+        The result of `evaluate`, and ``nearest``: `TrajectoryErrors.summary` of ``odometry``, ``slam`` and ``open``
+        (without loop closure) by the paper's association; ``quantiles`` of their position errors, m; ``sources`` and
+        ``missed`` of `radarize.evaluation.stress`, if the recording has a true scan.
 
     Raises:
-        InputError: no truth.
+        InputError: the run has no truth.
     """
     found = evaluate(run)
     RunFolder(run).write_metrics(found)
@@ -124,7 +124,7 @@ def figures(run: Path, recording: Path) -> dict[str, object]:
 
 @dataclass(frozen=True)
 class Timing(_Step):
-    """Stages of the pipeline on a recording's first frames, on cores that do nothing else."""
+    """Run time of each stage of the pipeline on a recording's first frames, without other work on the cores."""
 
     alone = True
 
@@ -137,7 +137,8 @@ class Timing(_Step):
         return min(self.case.frames, TIMED)
 
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """Returns: ``stages``: ms per frame by name, ``whole``: ms per frame, reading included; ``frames``."""
+        """Measure run times. Returns ``stages``: ms per frame by name; ``whole``: ms per frame, including reading;
+        ``frames``."""
         with Recording(self.case.path) as source:
             inputs = Inputs(source.config, weights=self.networks.weights, recording=source)
 
@@ -148,7 +149,7 @@ class Timing(_Step):
                     pass
                 return pipeline, time.perf_counter() - start
 
-            run(min(BATCH, self.frames), lambda share: None)  # compiles
+            run(min(BATCH, self.frames), lambda share: None)  # compiles kernels
             timed, whole = run(self.frames, report)
         spent = {name: 1e3 * seconds / self.frames for name, seconds in timed.seconds.items()}
         return {"stages": spent, "whole": 1e3 * whole / self.frames, "frames": self.frames}

@@ -1,4 +1,4 @@
-"""Milliseconds per frame of every stage from raw I/Q to map: the paper's table 6."""
+"""Benchmark of the run time of every stage from raw I/Q to map, ms per frame: the paper's table 6."""
 
 from radarize.evaluation.benchmark.runs import TIMED, Pair
 from radarize.evaluation.benchmark.study import Chosen, Study
@@ -6,7 +6,7 @@ from radarize.evaluation.benchmark.table import PAPER, Table
 from radarize.pipeline.methods import CLASSICAL
 from radarize.signal.effort import BATCH
 
-#: Stages as the paper lists them, of ours.
+#: Stages of the paper, and the stages of this pipeline that they consist of.
 STAGES = {
     "preprocess": ("spectra", "maps", "points"),
     "translation": ("translation",),
@@ -14,29 +14,29 @@ STAGES = {
     "map": ("scans",),
     "SLAM": ("slam",),
 }
-#: The paper's ms per frame, on a desktop with an RTX 3090 and on an AGX Orin.
+#: Run times of the paper on a desktop with an RTX 3090 and on an AGX Orin, ms per frame.
 DEVICES = {
     "RTX 3090": (9.53, 2.23, 6.60, 3.11, 0.93, 17.06),
     "AGX Orin": (11.76, 7.57, 14.78, 9.43, 4.68, 31.22),
 }
 DEVICE_STAGES = (*STAGES, "longest path")
 NOTES = [
-    "ms per frame. Preprocess: range and Doppler spectra, and the heat maps or points that methods read. Fused "
-    "translation and rotation hold the classical estimators as well. Other: odometry that is not made of these two.",
-    "Longest path: preprocessing, the slowest of translation, rotation and map beside each other, and SLAM, as the "
-    "paper adds up; here stages run one after the other, so the whole is their sum and the reading.",
-    "To reach: 17 ms for the whole on two cores.",
+    "Run times in ms per frame. preprocess: range and Doppler spectra, and heat maps or points. translation and "
+    "rotation of `fused` include the estimators without networks. other: odometry without these two stages.",
+    "longest path: preprocess, the slowest of translation, rotation and map in parallel, and SLAM, as summed by the "
+    "paper. Here stages run in sequence, so the whole is the sum of all stages and the reading of samples.",
+    "Target: 17 ms for the whole on two cores.",
 ]
 
 
 def pairs(chosen: Chosen) -> list[Pair]:
-    """Methods of choice, those without networks, and each method with the methods of choice beside it."""
+    """Return pairs of methods: the default ones, those without networks, and each method with a default partner."""
     first = [pair for pair in (chosen.partner, Pair(**CLASSICAL)) if pair.odometry in chosen.odometry]
     return [*first, *chosen.by_odometry(), *chosen.by_scans()]
 
 
 def stages(found: dict) -> dict[str, float]:
-    """The paper's stages, and what ours are beside them, of `radarize.evaluation.benchmark.runs.Timing`."""
+    """Sum the run times of `radarize.evaluation.benchmark.runs.Timing` to the stages of the paper, ms per frame."""
     spent = dict(found["stages"])
     took = {name: sum(spent.pop(part, 0.0) for part in parts) for name, parts in STAGES.items()}
     slowest = max(took["translation"], took["rotation"], took["map"], *spent.values())
@@ -45,7 +45,7 @@ def stages(found: dict) -> dict[str, float]:
 
 
 def tables(study: Study) -> list[Table]:
-    """Stages of every pair, and of the paper's on its machines."""
+    """Return the table of run times of every pair, and of the paper on its machines."""
     rows = []
     for timing in study.timings:
         found = study.results.get(timing)

@@ -1,4 +1,4 @@
-"""SLAM by combinations of odometry and scans: the paper's table 4, and its table 5 building by building."""
+"""Benchmarks of SLAM by combinations of odometry and scans: the paper's table 4, and its table 5 by building."""
 
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Chosen, Study
@@ -6,7 +6,7 @@ from radarize.evaluation.benchmark.table import PAPER, Table
 from radarize.evaluation.benchmark.trajectories import Figures, beside, split_rows, trajectory_tables
 from radarize.pipeline.methods import BEST
 
-#: The paper's combinations: ATE in m and rad, RE between frames in m. RadarHD alone is scan matching on its scans.
+#: The paper's combinations: ATE, m and rad; RE between frames, m. The paper's RadarHD alone is scan matching here.
 COMBINATIONS: Figures = {
     Pair("scan-matching", "radarhd"): (4.833, 0.751, 0.045),
     Pair("milliego", "radarhd"): (3.900, 0.808, 0.022),
@@ -14,20 +14,20 @@ COMBINATIONS: Figures = {
     Pair(BEST["odometry"], "radarhd"): (0.658, 0.154, 0.018),
     Pair(**BEST): (0.606, 0.116, 0.017),
 }
-#: The same of its own method in a building that it was not trained in, and the mean of these.
+#: Errors of the paper's method in buildings that it was not trained in, and their mean.
 BUILDINGS = {
     "A": (0.635, 0.102, 0.018), "B": (0.696, 0.179, 0.016), "C": (0.492, 0.105, 0.016), "mean": (0.608, 0.129, 0.017),
 }  # fmt: skip
 
 
 def pairs(chosen: Chosen) -> list[Pair]:
-    """The paper's combinations, every odometry with the scans of choice, and all scans with the odometry of choice."""
+    """Return the paper's combinations, all odometry with the default scans, and all scans with the default odometry."""
     paper = [pair for pair in COMBINATIONS if pair.odometry in chosen.odometry and pair.scans in chosen.scans]
     return [*paper, *chosen.by_odometry(), *chosen.by_scans()]
 
 
 def tables(study: Study) -> list[Table]:
-    """SLAM's trajectories by each protocol."""
+    """Return tables of the trajectory errors of SLAM by each protocol."""
     label: dict[Pair, dict[str, object]] = {
         pair: {"odometry": pair.odometry, "scans": pair.scans} for pair in study.pairs
     }
@@ -35,7 +35,7 @@ def tables(study: Study) -> list[Table]:
 
 
 def building_tables(study: Study) -> list[Table]:
-    """Each building, then their mean, for every odometry by each protocol."""
+    """Return tables of SLAM errors by building and their mean, for all odometry, by each protocol."""
     found = []
     for protocol in study.options.protocols:
         rows = []
@@ -48,7 +48,7 @@ def building_tables(study: Study) -> list[Table]:
         notes = [
             protocol.note,
             protocol.loops,
-            "Buildings are this data set's, not those of the paper that go by the same letter.",
+            "Buildings are those of this data set, not those of the paper with the same letter.",
         ]
         found.append(Table(f"SLAM in each building, {protocol.title}", rows, notes, (PAPER,)))
     return found

@@ -1,5 +1,5 @@
-"""What takes long in a comparison, done once: trainings, runs, timings. What a step found is kept beside what it made;
-whatever ends a comparison, the same command goes on after the last step that ended.
+"""Long steps of a benchmark, each done once: trainings, runs, timings. The result of a step is stored in its folder; if
+a benchmark is interrupted, the same command continues after the last step that has ended.
 """
 
 import json
@@ -15,17 +15,17 @@ from radarize.io.jobs import Report
 from radarize.io.jsonfile import read_json
 from radarize.io.replacing import write_whole
 
-#: File with what a step found.
+#: File with the result of a step.
 FOUND = "found.json"
 
 
 class Step(Protocol):
-    """One of them; hashable, and goes to other processes.
+    """A step; hashable, and can be sent to other processes.
 
     Attributes:
-        frames: how long it takes, in frames of a run.
-        alone: it uses all cores, or needs quiet ones.
-        place: its folder in the output's.
+        frames: duration, in frames of a run.
+        alone: whether it uses all cores, or needs them idle.
+        place: its folder inside the output folder.
     """
 
     @property
@@ -38,20 +38,20 @@ class Step(Protocol):
     def place(self) -> str: ...
 
     def identity(self) -> dict[str, object]:
-        """All that what it finds depends on, as JSON has it."""
+        """Return fingerprints of everything that the result depends on, in types of JSON."""
         ...
 
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """Do it in its folder; `report` takes the share that is done.
+        """Execute the step in its folder, and return its result; `report` takes the share that is done.
 
         Raises:
-            InputError: it cannot be done.
+            InputError: it cannot be executed.
         """
         ...
 
 
 def kept(step: Step, output: Path) -> dict[str, object] | None:
-    """What a step found earlier; None if it has yet to be done, or was done with something else."""
+    """Return the stored result of a step; None without one, or if its inputs have changed."""
     try:
         about = read_json(output / step.place / FOUND)
     except InputError:
@@ -66,17 +66,18 @@ def perform(
     progress: Callable[[int, int], None],
     ray: str | None = None,
 ) -> dict[Step, dict[str, object] | str]:
-    """Do steps in order, those that are not `alone` side by side.
+    """Execute steps in order; steps that are not `alone` run in parallel.
 
     Args:
-        steps: what to do.
-        output: folder of all.
-        workers: processes, each with its share of the cores; 1: this one, which also does steps that are `alone`.
+        steps: steps to execute.
+        output: output folder of all steps.
+        workers: number of processes, each with its share of the cores; 1: this process, which also executes steps that
+            are `alone`.
         progress: called with (frames done, frames in all).
         ray: address of a Ray cluster to use instead (`radarize.io.jobs`); steps that are `alone` have a node each.
 
     Returns:
-        What each step found, or the sentence why it could not be done.
+        Result of each step, or the sentence of its error.
     """
     steps = list(dict.fromkeys(steps))
     total = sum(step.frames for step in steps)
@@ -105,7 +106,7 @@ def perform(
             heard = jobs.perform(work, workers, ray, alone)
         for news in heard:
             if news.ended:
-                # What `_do` returned, or why it could not be done.
+                # The value returned by `_do`, or the error.
                 results[todo[news.name]] = cast(dict[str, object] | str, news.result or news.error)
             report(todo[news.name], 1.0 if news.ended else news.done)
     return results
@@ -118,7 +119,7 @@ def _do(step: Step, output: Path, report: Report) -> dict[str, object] | str:
     except InputError as error:
         return str(error)
     folder.mkdir(parents=True, exist_ok=True)
-    # Read as they will be next time.
+    # Types as read from the file.
     text = json.dumps({"of": step.identity(), "found": found}, indent=1)
     write_whole(folder / FOUND, text + "\n")
     return json.loads(text)["found"]

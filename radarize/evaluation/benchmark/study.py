@@ -1,4 +1,4 @@
-"""A comparison of methods: what it is (`Benchmark`), and how it goes on a data set (`Study`)."""
+"""A comparison of methods: its definition (`Benchmark`), and its execution on a data set (`Study`)."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,18 +23,18 @@ from radarize.pipeline.methods import BEST, ODOMETRY, SCANS, best_methods
 
 @dataclass(frozen=True)
 class Options:
-    """What is compared, by default all that there is, and with what.
+    """Options of a comparison; by default all methods are compared.
 
     Attributes:
-        methods: keys of `radarize.pipeline.methods.ODOMETRY` and `SCANS`; of a sort of which none is named, all that
-            read samples.
+        methods: keys of `radarize.pipeline.methods.ODOMETRY` and `SCANS`; if none of a kind is given, all of this kind
+            that read samples.
         weights: folder of the networks' weights; the shipped ones if None.
         trained: train networks on each split instead.
-        epochs: of these trainings, at most; their defaults if None.
+        epochs: maximum number of epochs of these trainings; their defaults if None.
         protocol: a key of `PROTOCOLS`; all if None.
-        workers: processes.
+        workers: number of processes.
         ray: address of a Ray cluster to use instead.
-        command: that the results name.
+        command: command that is printed with the results.
     """
 
     methods: Sequence[str] = ()
@@ -47,7 +47,7 @@ class Options:
     command: str = field(default_factory=lambda: command("radarize"))
 
     def check(self) -> None:
-        """Raises: InputError: an unknown name, or weights that are none."""
+        """Check names and paths; InputError for an unknown name, or a missing folder of weights."""
         if unknown := [name for name in self.methods if name not in (*ODOMETRY, *SCANS)]:
             raise InputError(f"methods names {unknown[0]!r}, expected some of: {', '.join((*ODOMETRY, *SCANS))}")
         if self.protocol is not None and self.protocol not in PROTOCOLS:
@@ -59,12 +59,12 @@ class Options:
 
     @property
     def shipped(self) -> bool:
-        """Whether networks are those that come with the package."""
+        """Whether the networks are the shipped ones."""
         return not self.trained and self.weights is None
 
     @property
     def protocols(self) -> list[Protocol]:
-        """Ways to compare trajectories."""
+        """Evaluation protocols."""
         return [PROTOCOLS[self.protocol]] if self.protocol else list(PROTOCOLS.values())
 
 
@@ -74,7 +74,7 @@ class Chosen:
 
     Attributes:
         odometry, scans: keys of `radarize.pipeline.methods.ODOMETRY` and `SCANS`.
-        partner: what is run with methods of the other sort when these are compared.
+        partner: default pair; its odometry is run with all scans, and its scans with all odometry.
     """
 
     odometry: tuple[str, ...]
@@ -82,16 +82,16 @@ class Chosen:
     partner: Pair
 
     def by_odometry(self) -> list[Pair]:
-        """Every odometry; the scans are the same."""
+        """Return all odometry, with the default scans."""
         return [Pair(odometry, self.partner.scans) for odometry in self.odometry]
 
     def by_scans(self) -> list[Pair]:
-        """Every scan; odometry is the same."""
+        """Return all scans, with the default odometry."""
         return [Pair(self.partner.odometry, scans) for scans in self.scans]
 
     @classmethod
     def of(cls, options: Options, data: DataSet) -> "Chosen":
-        """Methods of choice are those without networks where the shipped ones do not fit the radar."""
+        """Choose methods. The default pair has no networks if the shipped ones do not support the radar."""
         partner = best_methods(data.cases[0].config)[0] if options.shipped else BEST
 
         def compared(known: Mapping[str, Method]) -> tuple[str, ...]:
@@ -103,17 +103,18 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """A comparison.
+    """Definition of a comparison.
 
     Attributes:
-        title, about: in short, and in a sentence.
-        pairs: what it runs.
-        tables: what it makes of that.
-        split: kind of splits whose test parts it goes through, see `DataSet.splits`; None: all recordings.
-        timed: it measures time, on the first recording.
-        lacks: what a data set must have and has not, as a sentence.
-        draw: sections of its page below the tables.
-        picture: beside its tables, which it is given, too; None: there is none.
+        title: title of the page.
+        about: description in a sentence.
+        pairs: returns the pairs of methods to run.
+        tables: returns the tables of a study that has run.
+        split: kind of splits whose test recordings are used, see `DataSet.splits`; None: all recordings.
+        timed: whether it measures run times, on the first recording.
+        lacks: returns a sentence if a data set is not suitable; else an empty string.
+        draw: adds figures to the page, below the tables.
+        picture: returns a figure of a study and its tables, or None.
     """
 
     title: str
@@ -129,10 +130,10 @@ class Benchmark:
 
 @dataclass(frozen=True)
 class OwnBenchmark:
-    """A benchmark on other data than folders of recordings, which does everything itself.
+    """A benchmark on other data than folders of recordings.
 
     Attributes:
-        about: in a sentence.
+        about: description in a sentence.
         compare: called with the folder of data, the folder to write, and the options of ``radarize benchmark`` by name.
     """
 
@@ -148,14 +149,15 @@ class Study:
     """A benchmark on a data set.
 
     Attributes:
-        benchmark, data: which, on what.
+        benchmark: definition of the comparison.
+        data: data set.
         output: folder of all runs.
-        options: with what.
+        options: options of the comparison.
         chosen: methods that are compared.
-        splits: name to recordings.
-        networks: of each split.
-        trainings: that its runs need.
-        results: what each step found, or why it could not be done.
+        splits: test recordings by name of the split.
+        networks: networks of each split.
+        trainings: trainings that the runs need.
+        results: result of each step, or the sentence of its error.
     """
 
     benchmark: Benchmark
@@ -170,10 +172,10 @@ class Study:
 
     @classmethod
     def plan(cls, benchmark: Benchmark, data: DataSet, output: Path, options: Options = Options()) -> "Study":  # noqa: B008
-        """Look what is to be done.
+        """Plan the steps of a benchmark.
 
         Raises:
-            InputError: an unknown method, none that the benchmark compares, or a data set without what it needs.
+            InputError: an unknown method, no method that the benchmark compares, or a data set that is not suitable.
         """
         options.check()
         if reason := benchmark.lacks(data):
@@ -199,25 +201,25 @@ class Study:
 
     @property
     def pairs(self) -> list[Pair]:
-        """Methods that are run."""
+        """Pairs of methods that are run."""
         return list(dict.fromkeys(self.benchmark.pairs(self.chosen)))
 
     @property
     def kinds(self) -> list[str]:
-        """Networks that they need."""
+        """Kinds of network that the methods need."""
         return list(dict.fromkeys(kind for pair in self.pairs for kind in pair.networks))
 
     @property
     def cases(self) -> list[Case]:
-        """Recordings that test, each once, in the data set's order."""
+        """Test recordings, each once, in the order of the data set."""
         tested = {case for cases in self.splits.values() for case in cases}
         return [case for case in self.data.cases if case in tested]
 
     @property
     def runs(self) -> list[tuple[str, RunStep]]:
-        """All runs with their splits, recording by recording, so that each is read from memory after the first time."""
+        """All runs with their splits, ordered by recording, so that its file is in the cache after the first run."""
         return [
-            # Methods without networks are the same in every split.
+            # Methods without networks do not depend on the split.
             (split, RunStep(case, pair, self.networks[split] if pair.networks else Networks()))
             for split, cases in self.splits.items()
             for case in cases
@@ -226,24 +228,24 @@ class Study:
 
     @property
     def timings(self) -> list[Timing]:
-        """On the first recording."""
+        """Measurements of run time, on the first recording."""
         split, cases = next(iter(self.splits.items()))
         return [Timing(cases[0], pair, self.networks[split]) for pair in self.pairs]
 
     @property
     def steps(self) -> list[Step]:
-        """All that takes long, in order."""
+        """All long steps, in order."""
         return [*self.trainings, *(self.timings if self.benchmark.timed else (run for _, run in self.runs))]
 
     def of(self, pair: Pair, once: bool = True) -> pd.DataFrame:
-        """Figures of a pair's runs that ended well, a row each.
+        """Return the metrics of the successful runs of a pair, one row per run.
 
         Args:
-            pair: of methods.
-            once: each run once, in the order of recordings; else as often as it tests in a split.
+            pair: methods.
+            once: each run once, in the order of recordings; else once per split in which it is tested.
 
         Returns:
-            Columns ``run`` (`RunStep`), ``split``, ``recording`` (name), and every figure of
+            Columns ``run`` (`RunStep`), ``split``, ``recording`` (name), and every metric of
             `radarize.evaluation.benchmark.runs.figures` by its path: ``odometry.ate.position.mean``.
         """
         order = {case: k for k, case in enumerate(self.data.cases)}
@@ -257,7 +259,8 @@ class Study:
         return about.join(pd.json_normalize([self.results[run] for _, run in runs]))
 
     def by_group(self) -> Iterator[tuple[Pair, dict[str, object], pd.DataFrame]]:
-        """By platform, by building and of all: a pair, what a table's row says of the group, and its rows of `of`."""
+        """Yield for each group (platforms, buildings, all) and pair: the pair, the group's columns of a table, and the
+        rows of `of`."""
         found = {pair: self.of(pair) for pair in self.pairs}
         for name, members in groups(self.cases).items():
             for pair, runs in found.items():
@@ -266,8 +269,8 @@ class Study:
                     yield pair, {"on": name, "recordings": len(here)}, here
 
     def publish(self) -> Results:
-        """Tables, and all that tells what they are worth."""
-        splits = [f"Tested in splits {', '.join(self.splits)}."] if len(self.splits) > 1 else []
+        """Return the tables with their provenance."""
+        splits = [f"Test recordings of the splits {', '.join(self.splits)}."] if len(self.splits) > 1 else []
         return Results(
             self.benchmark.title,
             self.benchmark.tables(self),
@@ -279,13 +282,13 @@ class Study:
 
     @property
     def used(self) -> tuple[UsedNetwork, ...]:
-        """Networks that it was done with."""
+        """Networks that were used."""
         found = [one for networks in self.networks.values() for one in networks.used(self.kinds)]
         return tuple(dict.fromkeys(found))
 
     @property
     def shortfalls(self) -> list[str]:
-        """A sentence for each pair, or network, that there is something missing of."""
+        """Sentences on trainings and runs that failed."""
         found = []
         for training in self.trainings:
             if isinstance(reason := self.results.get(training), str):
@@ -295,24 +298,24 @@ class Study:
             of_pair = [self.results.get(step) for step in steps if step.pair == pair]
             reasons = [self._plain(found) for found in of_pair if isinstance(found, str)]
             if reasons:
-                found.append(f"{pair}: - on {len(reasons)} of {len(of_pair)} recordings ({reasons[0]}).")
+                found.append(f"{pair}: failed on {len(reasons)} of {len(of_pair)} recordings ({reasons[0]}).")
         return found
 
     def _plain(self, reason: str) -> str:
-        """A reason without folders, which are the machine's business."""
+        """Remove folders from the sentence of an error."""
         for folder in (self.output, self.data.folder, Path(__file__).parents[1]):
             reason = reason.replace(f"{folder}/", "").replace(f"{folder.resolve()}/", "")
         return reason
 
 
 def carry_out(studies: Sequence[Study], progress: Callable[[int, int], None]) -> None:
-    """Do what studies of the same options need, each step once for all of them, and give them what was found.
+    """Execute the steps of studies with the same options, each step once, and store the results in the studies.
 
     Raises:
-        InputError: nothing could be done.
+        InputError: all runs failed.
     """
     steps = [step for study in studies for step in study.steps]
-    # Networks before runs, and runs before timings, which want quiet cores.
+    # Trainings before runs, and runs before timings, which need idle cores.
     steps.sort(key=lambda step: (Training, RunStep, Timing).index(type(step)))
     options = studies[0].options
     results = perform(steps, studies[0].output, options.workers, progress, options.ray)

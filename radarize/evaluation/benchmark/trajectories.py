@@ -1,4 +1,4 @@
-"""Tables of trajectory errors, a row a method, by each protocol."""
+"""Tables of trajectory errors by method, for each protocol."""
 
 import pandas as pd
 
@@ -6,24 +6,24 @@ from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Study
 from radarize.evaluation.benchmark.table import PAPER, Table
 
-#: What the paper says beside: ATE in m and rad, RE between frames in m.
+#: Columns of the paper's results: ATE, m and rad; RE between frames, m.
 PAPER_COLUMNS = ("paper: ATE m", "paper: ATE rad", "paper: RE frame m")
-GYROSCOPE = "Turns of rnin are those of the IMU's gyroscope, which from frame to frame no radar reaches."
-#: By method.
+GYROSCOPE = "Yaw of rnin is from the IMU's gyroscope, whose error from frame to frame is below that of any radar."
+#: Results by pair of methods.
 Figures = dict[Pair, tuple[float, ...]]
 
 
 def trajectory_tables(
     study: Study, trajectory: str, labels: dict[Pair, dict[str, object]], paper: Figures, about: str
 ) -> list[Table]:
-    """A table for each protocol of a study.
+    """Return a table for each protocol of a study.
 
     Args:
-        study: carried out.
+        study: study that has run.
         trajectory: ``odometry`` or ``slam``.
-        labels: first columns of a pair's row; pairs that are not in it have none.
-        paper: its figures of a pair.
-        about: what the titles begin with.
+        labels: first columns of the rows, by pair; other pairs have no row.
+        paper: the paper's results by pair.
+        about: start of the titles.
     """
     pairs, found = list(labels), []
     runs = {pair: study.of(pair, once=False) for pair in pairs}
@@ -45,11 +45,11 @@ def trajectory_tables(
 
 
 def beside(paper: tuple[float, ...] | None) -> dict[str, float | None]:
-    """The paper's columns, empty where it says nothing."""
+    """Return the columns of the paper's results; None if it has none."""
     return dict(zip(PAPER_COLUMNS, paper or (None,) * len(PAPER_COLUMNS), strict=True))
 
 
 def split_rows(study: Study, pair: Pair) -> dict[str, pd.DataFrame]:
-    """Runs of a pair by split, then those of all."""
+    """Return the runs of a pair by split, then all runs."""
     runs = study.of(pair, once=False)
     return {split: runs[runs["split"] == split] for split in study.splits} | {"mean": runs}

@@ -1,7 +1,7 @@
-"""What changes as one thing is varied: the severity of multipath, or a parameter of the radar."""
+"""Metrics over one varied quantity: the severity of multipath, or a parameter of the radar."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -19,13 +19,15 @@ from radarize.pipeline.methods import CLASSICAL, ODOMETRY, SCANS
 
 @dataclass(frozen=True)
 class Panels:
-    """How figures are drawn over what was varied.
+    """Plots of metrics over a varied quantity.
 
     Attributes:
-        panel, over: attributes of recordings and columns of the table: a panel each, the abscissa.
-        line: column of the table with a line each.
-        names: figures, of `FIGURES`.
+        panel: attribute of recordings, and column of the table, with a value for each panel.
+        over: attribute of recordings, and column of the table, of the abscissa.
+        line: column of the table with a value for each line.
+        names: names of metrics in `FIGURES`.
         hint: a command that makes such recordings.
+        quantities: by panel, label of the abscissa with its unit and factor from the values to that unit.
     """
 
     panel: str
@@ -33,9 +35,11 @@ class Panels:
     line: str
     names: tuple[str, ...]
     hint: str
+    quantities: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     def lacks(self, data: DataSet) -> str:
-        """What a data set must have and has not: recordings that say what was varied."""
+        """Return a sentence if no recording of a data set has the attributes `panel` and `over`; else an empty
+        string."""
         if any({self.panel, self.over} <= case.attributes.keys() for case in data.cases):
             return ""
         return (
@@ -44,7 +48,7 @@ class Panels:
         )
 
     def rows(self, study: Study) -> pd.DataFrame:
-        """A row for each pair and recording that has the attributes, by these; figures by name."""
+        """Return a row for each pair of methods and recording with the attributes, sorted by them; metrics by name."""
         parts = []
         for pair in study.pairs:
             runs = study.of(pair)
@@ -61,7 +65,7 @@ class Panels:
         return found.iloc[order].reset_index(drop=True)
 
     def means(self, rows: pd.DataFrame, title: str) -> Table:
-        """Figures by what was varied and by line, mean over walks; of trajectories with their standard errors."""
+        """Return a table of metrics by panel, abscissa and line: means over walks; of ATE with standard errors."""
         groups = in_words(rows).groupby([rows[self.panel], rows[self.over], rows[self.line]], sort=False)
         found, errors = groups.mean(), groups.sem()
         for figure in {FIGURES["odometry"].title, FIGURES["slam"].title} & {*found}:
@@ -70,23 +74,24 @@ class Panels:
         return Table(title, found.reset_index().to_dict("records"), ["Means over walks +- their standard errors."])
 
     def table(self, rows: pd.DataFrame, title: str) -> Table:
-        """Figures by what was varied and by line."""
+        """Return a table of metrics by panel, abscissa and line."""
         labels = rows[[self.panel, self.over, self.line]]
         return Table(title, pd.concat([labels, in_words(rows)], axis=1).to_dict("records"))
 
     def picture(self, _: Study, tables: Sequence[Table]) -> Figure | None:
-        """Curves of the last table; None without any. Values that are no numbers have none."""
+        """Plot the last table, except rows whose abscissa is not a number; None if nothing is left."""
         frame = tables[-1].frame.rename(columns={figure.title: name for name, figure in FIGURES.items()})
         frame = frame[frame[self.over].map(lambda value: isinstance(value, int | float))]
         shown = [name for name in self.names if name in frame and frame[name].notna().any()]
         for name in shown:
             frame[name] = frame[name].astype(float) / FIGURES[name].factor
-        return curves(frame.to_dict("records"), self.over, self.panel, self.line, shown) if shown else None
+        rows = frame.to_dict("records")
+        return curves(rows, self.over, self.panel, self.line, shown, self.quantities) if shown else None
 
     def draw(self, study: Study, page: Page) -> None:
-        """The same on a page."""
+        """Add the plots to a page."""
         if (figure := self.picture(study, study.benchmark.tables(study))) is not None:
-            page.section("Curves", f"Figures over {self.over}, a column for each {self.panel}.")
+            page.section("Plots", f"Metrics over {self.over}; one column for each {self.panel}, one line per method.")
             page.picture(figure)
 
 
@@ -94,20 +99,34 @@ STRESS = Panels(
     "stress", "severity", "scans", ("ghosts", "missed", "map_f1", "matching", "slam"), "radarsim dataset stress"
 )
 ABLATION = Panels(
-    "ablation", "value", "methods", ("ghosts", "missed", "map_f1", "odometry"), "radarsim dataset ablation/bandwidth"
+    "ablation",
+    "value",
+    "methods",
+    ("ghosts", "missed", "map_f1", "odometry"),
+    "radarsim dataset ablation/bandwidth",
+    {
+        "antennas": ("virtual antennas", 1.0),
+        "bandwidth": ("bandwidth, GHz", 1e-9),
+        "frame rate": ("frame rate, Hz", 1.0),
+        "loops": ("loops per frame", 1.0),
+        "noise figure": ("noise figure, dB", 1.0),
+        "sensor height": ("sensor height, m", 1.0),
+        "tilt": ("downward pitch, deg", 1.0),
+    },
 )
-#: Odometry that is as good as its scans.
+#: Odometry that depends on scans alone.
 MATCHING = "scan-matching"
 
 
 def in_words(rows: pd.DataFrame) -> pd.DataFrame:
-    """Figures that there are by their titles, in their units."""
+    """Return a table of all metrics with a value, in their units, with their titles as columns."""
     known = {name: figure for name, figure in FIGURES.items() if rows[name].notna().any()}
     return pd.DataFrame({each.title: each.factor * rows[name] for name, each in known.items()}, index=rows.index)
 
 
 def classical_pairs(chosen: Chosen) -> list[Pair]:
-    """Methods without networks, which read one radar alone: each odometry, and all scans with one of them."""
+    """Return all methods without networks: each odometry, and all scans with one odometry. Networks are left out,
+    because they are trained for one radar."""
     plain = Pair(**CLASSICAL)
     return [
         *(Pair(name, plain.scans) for name in chosen.odometry if not ODOMETRY[name].networks),
@@ -116,18 +135,18 @@ def classical_pairs(chosen: Chosen) -> list[Pair]:
 
 
 def ablation_tables(study: Study) -> list[Table]:
-    """Figures over the values of each parameter."""
+    """Return metrics over the values of each parameter."""
     return [ABLATION.means(ABLATION.rows(study), "By parameter")]
 
 
 def stress_pairs(chosen: Chosen) -> list[Pair]:
-    """Every scan with the odometry of choice, and with odometry that is made of nothing else."""
+    """Return all scans with the default odometry, and with odometry by matching these scans."""
     matching = [Pair(MATCHING, scans) for scans in chosen.scans if MATCHING in chosen.odometry]
     return [*chosen.by_scans(), *matching]
 
 
 def stress_tables(study: Study) -> list[Table]:
-    """A ranking of scans, then all figures over severity."""
+    """Return a ranking of scans, then all metrics over severity."""
     rows = stress_rows(study)
     levels = {"all": rows, "most severe": rows[rows["severity"] == rows["severity"].max()]}
     ranking = []
@@ -136,10 +155,10 @@ def stress_tables(study: Study) -> list[Table]:
         means.insert(0, "levels", title)
         ranking.append(means.sort_values([title for title in means if title == FIGURES["ghosts"].title] or "levels"))
     note = (
-        f"Means over places; odometry: {study.chosen.partner.odometry}, which needs no scans, and by matching these "
-        "scans alone. Truth by provenance: a wrong return is more than 10 cm off the first surface on its bearing, and "
-        "comes from the strongest cause of its cell. Missed: bearings with a surface in reach that return nothing at "
-        "it or before it."
+        f"Means over places. Odometry: {study.chosen.partner.odometry}, which does not use scans, and scan matching "
+        "with these scans. A wrong return has a range error of more than 10 cm against the first surface on its "
+        "bearing; its path type is that of the strongest echo of its cell in the simulation. Missed surfaces: bearings "
+        "with a surface in range but without a return at it or in front of it."
     )
     return [
         Table(
@@ -150,7 +169,7 @@ def stress_tables(study: Study) -> list[Table]:
 
 
 def stress_rows(study: Study) -> pd.DataFrame:
-    """Rows of every scan with the odometry of choice; ``matching``: odometry's error by these scans."""
+    """Return rows of all scans with the default odometry; ``matching``: ATE of scan matching with these scans, m."""
     rows = STRESS.rows(study)
     own = rows[rows["odometry_by"] == study.chosen.partner.odometry]
     matching = rows[rows["odometry_by"] == MATCHING].set_index(["recording", "scans"])["odometry"]

@@ -1,4 +1,4 @@
-"""Walks on which nothing was chosen: how far each method is off, whether it knows, and the worst walks drawn."""
+"""Benchmark on the test set: errors and NEES of each method, and plots of the walks with the largest errors."""
 
 from functools import cache
 from pathlib import Path
@@ -9,13 +9,14 @@ import pandas as pd
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from radarize.evaluation.benchmark.followed import FrameErrors, joined, true_poses
+from radarize.evaluation.benchmark.frame_errors import FrameErrors, joined, true_poses
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.study import Chosen, Study
 from radarize.evaluation.benchmark.table import NONE, Table, with_error, with_median
-from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
+from radarize.evaluation.nees import nees
+from radarize.evaluation.report.page import COLORS
 from radarize.io.alignment import trajectory, yaws
 from radarize.io.pose import Pose, between, wrap
 from radarize.io.tum import planar
@@ -23,11 +24,12 @@ from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.methods import CLASSICAL
 from radarize.pipeline.runfolder import RunFolder
 
-#: s: spans over which claims of poses are followed; the longest that a walk of a minute has a few of.
+#: Lengths of the windows for the NEES of poses, s; walks of a minute have several of the longest.
 SPANS = (1, 10, 50)
-#: m, SLAM's mean error on a walk that counts as lost; times odometry's error, from which on SLAM did harm.
+#: Mean position error of SLAM above which a walk counts as lost, m; ratio to the error of odometry above which SLAM
+#: made it worse.
 LOST, WORSE = 0.20, 1.05
-#: Columns: where the figure stands in `Study.of`.
+#: Columns of the table: path of the metric in `Study.of`.
 ERRORS = {
     "odometry m": "odometry.ate.position.mean",
     "odometry rad": "odometry.ate.rotation.mean",
@@ -35,15 +37,15 @@ ERRORS = {
     "SLAM rad": "slam.ate.rotation.mean",
 }
 NOTES = (
-    "Mean error after alignment, mean over walks +- its standard error. Against the first method: how much more, mean "
-    "over the same walks +- its standard error. NEES: squared error over the claimed variance, per dimension, of all "
-    "frames and windows, 1 if that is right; in brackets the median over its expectation. Of SLAM: of poses since the "
-    "start, mean and median over walks."
+    "odometry, SLAM: ATE (mean error after alignment), mean over walks +- standard error; columns with `more`: "
+    "difference to the first method on the same walks +- standard error. NEES: normalised estimation error squared per "
+    "dimension, mean over all frames or windows, 1 if covariances are consistent; in brackets the median over its "
+    "expectation. NEES SLAM: of the motion since the start, mean and median over walks."
 )
 
 
 def pairs(chosen: Chosen) -> list[Pair]:
-    """Each odometry with the scans of choice; the methods without networks, and the published ones, by themselves."""
+    """Return pairs: all odometry with the default scans, methods without networks, and the published methods."""
     alone = [Pair(**CLASSICAL), Pair("published", "published")]
     known = [pair for pair in alone if pair.odometry in chosen.odometry and pair.scans in chosen.scans]
     others = [pair for pair in chosen.by_odometry() if pair.odometry != "published"]
@@ -51,7 +53,7 @@ def pairs(chosen: Chosen) -> list[Pair]:
 
 
 def tables(study: Study) -> list[Table]:
-    """Each method on all walks; the method of choice by platform and building, and walk by walk."""
+    """Return tables of each pair on all walks, and of the default pair by platform and building, and by walk."""
     ours, first = study.chosen.partner, study.of(study.chosen.partner)
     methods, groups = [], []
     for pair, group, runs in study.by_group():
@@ -80,9 +82,9 @@ def tables(study: Study) -> list[Table]:
 
 
 def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
-    """Figures of some walks and of their runs' folders; means with standard errors over walks."""
+    """Return a row of metrics of walks and the folders of their runs; means +- standard errors over walks."""
     odometry, slam = runs[ERRORS["odometry m"]], runs[ERRORS["SLAM m"]]
-    frames = joined([_followed(path) for path in paths])
+    frames = joined([_frame_errors(path) for path in paths])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     return {
         "odometry m": with_error(odometry),
@@ -100,54 +102,54 @@ def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
 
 
 def _against(first: pd.DataFrame, runs: pd.DataFrame) -> dict[str, str]:
-    """How much more a method is off than the first one."""
+    """Return the difference of a method's errors to those of the first one."""
     both = first.merge(runs, on="recording", suffixes=("", " then"))
     more = {name: both[f"{ERRORS[name]} then"] - both[ERRORS[name]] for name in ("odometry m", "SLAM m")}
     return {f"{name} more": NONE if (each == 0).all() else with_error(each) for name, each in more.items()}
 
 
 @cache
-def _followed(run: Path) -> FrameErrors:
+def _frame_errors(run: Path) -> FrameErrors:
     return FrameErrors.read(run)
 
 
-def pose_nees(poses: Pose, true: Pose, errors: ErrorModel, starts: range, length: int) -> Float[np.ndarray, "window"]:
-    """Squared error of a motion over windows of some frames over what it claims, per dimension.
+def motion_nees(poses: Pose, true: Pose, errors: ErrorModel, starts: range, length: int) -> Float[np.ndarray, "window"]:
+    """Return the NEES per dimension of relative motions over windows.
 
     Args:
-        poses, true: of each frame.
-        errors: of the steps between poses.
-        starts: of the windows.
-        length: of each, frames.
+        poses, true: estimated and true pose of each frame.
+        errors: error model of the relative motions between frames.
+        starts: first frames of the windows.
+        length: length of a window, frames.
     """
     first = np.array(starts)
     moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
-    return normalised(between(truly, moved), errors.motions(poses, first, length))
+    return nees(between(truly, moved), errors.motions(poses, first, length))
 
 
 @cache
 def _nees(run: Path, span: float) -> np.ndarray:
-    """Of odometry, a window a second; none in shorter walks."""
+    """Return the NEES of a run's odometry, with a window every second; empty for walks shorter than a window."""
     folder = RunFolder(run)
     assert folder.odometry is not None and folder.errors is not None  # every method of odometry leaves both
     times, poses = folder.odometry
     rate = 1 / np.median(np.diff(times))
     starts = range(0, len(times) - round(span * rate), max(round(rate), 1))
     return (
-        pose_nees(planar(poses), true_poses(folder), folder.errors, starts, round(span * rate))
+        motion_nees(planar(poses), true_poses(folder), folder.errors, starts, round(span * rate))
         if starts
         else np.empty(0)
     )
 
 
 def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:
-    """Of `pose_nees`; the median over that of honest claims, 2.366 of three dimensions."""
+    """Return the mean NEES of runs, and the median over its expectation: 2.366 for three dimensions."""
     found = np.concatenate([_nees(run, span) for run in runs])
     return (float(found.mean()), float(np.median(found) / (2.366 / 3))) if len(found) else (np.nan, np.nan)
 
 
 def worst(study: Study) -> Figure | None:
-    """The walk of each platform on which SLAM is worst: its plan, how far headings are off, and what was seen."""
+    """Plot the walk with the largest error of SLAM for each platform: trajectories, heading error, share of returns."""
     runs = study.of(study.chosen.partner)
     if not len(runs):
         return None
@@ -158,16 +160,20 @@ def worst(study: Study) -> Figure | None:
         truth = trajectory(folder.scans["truth/time"], folder.scans["truth/pose"])
         for x0, y0, x1, y1 in folder.scans.get("truth/floor_plan", ()):
             plan.plot((x0, x1), (y0, y1), color="0.6", lw=0.5)
-        for name, path, color in (("odometry", folder.odometry, "C1"), ("SLAM", folder.trajectory, "C0")):
+        trajectories = (("odometry", folder.odometry), ("SLAM", folder.trajectory))
+        for name, path in trajectories:
+            color = COLORS[name.lower()]
             assert path is not None  # every method of odometry leaves it
             errors = evaluate_trajectory(trajectory(*path), truth)
-            plan.plot(*errors.estimate.positions_xyz[:, :2].T, color, label=name)
+            plan.plot(*errors.estimate.positions_xyz[:, :2].T, color=color, label=name)
             off = yaws(errors.estimate) - yaws(errors.reference)
-            below.plot(errors.time - errors.time[0], np.degrees(wrap(off)), color)
+            below.plot(errors.time - errors.time[0], np.degrees(wrap(off)), color=color)
         true = planar(folder.scans["truth/pose"])[:, :2]
         plan.plot(*true.T, "k--", label="true")
         (left, low), (right, high) = true.min(axis=0) - 3, true.max(axis=0) + 3
-        plan.set(title=run.case.name, xlim=(left, right), ylim=(low, high), aspect="equal", xlabel="m", ylabel="m")
+        plan.set(
+            title=run.case.name, xlim=(left, right), ylim=(low, high), aspect="equal", xlabel="x, m", ylabel="y, m"
+        )
         below.set(xlabel="time, s", ylabel="heading error, deg")
         seen = below.twinx()
         seen.plot(folder.scans["time"] - errors.time[0], 100 * np.isfinite(folder.scans["ranges"]).mean(axis=1), "0.7")

@@ -1,4 +1,4 @@
-"""What is shown of recordings, runs and comparisons: pages that open without a network, and tables in the terminal.
+"""Reports of recordings, runs and comparisons: self-contained HTML pages, and tables in the terminal.
 
-`Page` holds what a page is made of, ``templates`` what it looks like; `plots` and `drawings` draw what stands in it.
+`Page` collects the content of a page, ``templates`` define its layout, `plots` and `drawings` draw its figures.
 """

@@ -1,6 +1,6 @@
-"""Runs of several methods beside each other: trajectories, distributions of errors, maps.
+"""Comparison of runs of several methods on a page: trajectories, distributions of errors, maps.
 
-Runs are folders by recording and method; `colors` has one for each method.
+Runs are folders by recording and method; `colors` has a colour for each method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,21 +15,22 @@ from radarize.evaluation.report.plots import from_above, line, panels, plain, wa
 from radarize.io.alignment import fitted, moved, trajectory
 from radarize.pipeline.runfolder import RunFolder
 
-#: Poses of a trajectory that are drawn, and errors of a distribution.
+#: Maximum number of drawn poses of a trajectory, and of points of a distribution.
 _POSES, _ERRORS = 240, 200
 Runs = Mapping[str, Mapping[str, RunFolder]]
 
 
 def _truth(run: RunFolder) -> PoseTrajectory3D:
-    assert run.reference is not None  # what is compared has been judged by it
+    assert run.reference is not None  # compared runs have been evaluated
     return trajectory(*run.reference)
 
 
 def draw_trajectories(page: Page, runs: Runs, colors: Mapping[str, str], which: str) -> None:
-    """Trajectories (``odometry`` or ``slam``) from above, laid upon the truth, of one recording at a time."""
+    """Draw trajectories (``odometry`` or ``slam``) from above, aligned with the truth, one recording at a time."""
     page.section(
         "Trajectories",
-        "From above, each laid upon the truth. The menu chooses a recording; click a name to hide or show a method.",
+        "Trajectories from above, each aligned with the truth. Select a recording in the menu; click a name to hide or "
+        "show a method.",
     )
     figure, owners = from_above(), []
     for recording, folders in runs.items():
@@ -53,17 +54,19 @@ def draw_trajectories(page: Page, runs: Runs, colors: Mapping[str, str], which: 
 def draw_errors(
     page: Page, errors: Mapping[str, Mapping[str, tuple[Sequence[float], float]]], colors: Mapping[str, str]
 ) -> None:
-    """Share of poses within an error, and errors of recordings.
+    """Draw the cumulative distribution of position errors, and the mean error of each recording.
 
     Args:
-        errors: of position by method and recording, m: quantiles, as many of each recording, and the mean.
+        page: page to extend.
+        errors: position errors by method and recording, m: quantiles, equally many for each recording, and the mean.
+        colors: colour of each method.
     """
     page.section(
         "Errors",
-        "Share of all poses, every recording alike, whose position is off by no more than that, after alignment; and "
-        "the mean error of each recording (dots).",
+        "Cumulative distribution of the position error after alignment, where all recordings have the same weight; and "
+        "the mean position error of each recording (dots).",
     )
-    shares = panels("share of poses", x="position error, m")
+    shares = panels("cumulative share of poses", x="position error, m")
     boxes = panels("mean position error, m", x="")
     for method, recordings in errors.items():
         values = np.sort(np.concatenate([quantiles for quantiles, _ in recordings.values()]))
@@ -80,10 +83,8 @@ def draw_errors(
 
 
 def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
-    """Maps beside the floor plan, a picture for each recording."""
-    page.section(
-        "Maps", "Floor plan where the simulated recording knows it, and SLAM's maps, all in the truth's frame."
-    )
+    """Draw maps beside the floor plan, one picture for each recording."""
+    page.section("Maps", "Floor plan of a simulated recording, and occupied cells of the SLAM maps, in the true frame.")
     for recording, folders in runs.items():
         first = next(iter(folders.values()))
         plan, truth = first.scans.get("truth/floor_plan"), _truth(first)
@@ -109,5 +110,5 @@ def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
 
 
 def _spread(count: int, most: int) -> np.ndarray:
-    """Indices of some of so many from the first to the last."""
+    """Return at most a number of indices, evenly spaced from the first to the last."""
     return np.linspace(0, count - 1, min(most, count)).astype(int)

@@ -1,4 +1,4 @@
-"""What a recording holds, as plain data and as tables."""
+"""Contents of a recording, as plain data and as tables."""
 
 import json
 from pathlib import Path
@@ -29,7 +29,7 @@ DERIVED = {
 
 
 def contents(path: Path) -> dict[str, Any]:
-    """Everything about a recording but its samples, as JSON-ready data. All samples are unpacked to see that they can.
+    """Return everything about a recording except its samples, as JSON-ready data. All samples are unpacked as a check.
 
     Returns:
         ``path``, ``frames``, ``duration`` (s), ``lost_chirps`` (count) and ``lost_share``, ``damage`` (sentences, see
@@ -60,12 +60,12 @@ def contents(path: Path) -> dict[str, Any]:
 
 
 def _plain(value: object) -> object:
-    """As JSON has it."""
+    """Convert to types of JSON."""
     return json.loads(json.dumps(value, default=lambda each: each.tolist() if hasattr(each, "tolist") else str(each)))
 
 
 def _readable(value: float, unit: str) -> tuple[str, str]:
-    """A value with its unit, with a prefix where that saves zeros."""
+    """Format a value and its unit with an SI prefix."""
     for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("u", 1e-6)):
         if abs(value) >= factor * 0.9999:
             return f"{value / factor:.5g}", prefix + unit
@@ -73,7 +73,7 @@ def _readable(value: float, unit: str) -> tuple[str, str]:
 
 
 def data_sets(found: dict) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows of a table of the data sets that `contents` found."""
+    """Return head and rows of the table of data sets, from the result of `contents`."""
     rows: list[tuple[str, ...]] = [
         (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
         for name, item in found["data_sets"].items()
@@ -82,12 +82,12 @@ def data_sets(found: dict) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 
 def _spaced(value: object) -> object:
-    """An attribute, with a space after each comma where it is JSON, so that a line of a table may end there."""
+    """Add a space after each comma of an attribute in JSON, so that a table can break its lines there."""
     return json.dumps(json.loads(value)) if isinstance(value, str) and value.startswith("{") else value
 
 
 def show(found: dict) -> None:
-    """Print what `contents` found."""
+    """Print the result of `contents`."""
     print(
         f"{printable(found['path'])}: {found['frames']} frames, {found['duration']:.2f} s, "
         f"{found['lost_chirps']} chirps lost ({100 * found['lost_share']:.2f} %)"

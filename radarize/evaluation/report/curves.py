@@ -1,4 +1,4 @@
-"""Curves of figures over what was varied: the severity of multipath, or a parameter of the radar."""
+"""Plots of metrics over a varied quantity: the severity of multipath, or a parameter of the radar."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,15 +16,19 @@ def curves(
     panel: str = "stress",
     line: str = "scans",
     names: Sequence[str] = ("ghosts", "missed", "map_f1", "odometry"),
+    quantities: Mapping[str, tuple[str, float]] | None = None,
 ) -> Figure:
-    """Figures over what was varied: a row of axes for each figure, a column for each panel, means where rows are alike.
+    """Plot metrics over a varied quantity: a row of axes for each metric, a column for each panel. Rows of the table
+    with equal keys are averaged.
 
     Args:
-        rows: of a table; each has `names` and the following.
-        over: key of the abscissa: numbers, or names, which stand in their order.
-        panel: key of what has axes of its own.
-        line: key of what has a line of its own.
-        names: figures, of `FIGURES`.
+        rows: rows of a table with the columns `names`, `over`, `panel` and `line`.
+        over: column of the abscissa: numbers, or names in the order of the rows.
+        panel: column with a value for each column of axes.
+        line: column with a value for each line.
+        names: names of metrics in `FIGURES`.
+        quantities: by panel, label of the abscissa with its unit and factor from the values to that unit; by default
+            the name of `over`.
 
     Returns:
         The matplotlib figure.
@@ -35,22 +39,22 @@ def curves(
     for axis_row, name in zip(axes, names, strict=True):
         figure_of = FIGURES[name]
         for axis, (place, here) in zip(axis_row, table.groupby(panel, sort=False), strict=True):
+            label, factor = (quantities or {}).get(str(place), (over, 1.0))
             values = here[over].unique()
             number = all(isinstance(value, (int, float)) for value in values.tolist())
-            at = {value: float(value) if number else k for k, value in enumerate(values)}
-            for k, label in enumerate(lines):
-                means = here[here[line] == label].groupby(over)[name].mean().dropna().rename(at).sort_index()
-                axis.plot(means.index, figure_of.factor * means, "o-", ms=3.5, lw=1.4, color=f"C{k}", label=label)
-            axis.set_xticks(list(at.values()), [f"{value:.4g}" if isinstance(value, float) else value for value in at])
+            at = {value: factor * float(value) if number else k for k, value in enumerate(values)}
+            for k, method in enumerate(lines):
+                means = here[here[line] == method].groupby(over)[name].mean().dropna().rename(at).sort_index()
+                axis.plot(means.index, figure_of.factor * means, "o-", ms=3.5, lw=1.4, color=f"C{k}", label=method)
+            axis.set_xticks(list(at.values()), [f"{at[value]:.4g}" if number else value for value in at])
+            axis.set_xlabel(label)
             axis.grid(alpha=0.25)
             axis.label_outer()
             if name == names[0]:
                 axis.set_title(place)
-        top = max(axis.dataLim.y1 for axis in axis_row)
+        top = 1.06 * max(axis.dataLim.y1 for axis in axis_row)
         for axis in axis_row:
-            axis.set_ylim(0, 1.06 * top if np.isfinite(top) and top > 0 else 1)
+            axis.set_ylim(0, (min(top, 100) if "%" in figure_of.unit else top) if np.isfinite(top) and top > 0 else 1)
         axis_row[0].set_ylabel(f"{figure_of.words},\n{figure_of.unit}")
-    for axis in axes[-1]:
-        axis.set_xlabel(over)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(lines), frameon=False)
     return figure

@@ -1,4 +1,4 @@
-"""Drawings of heat maps and scans with matplotlib, transparent and in neutral ink."""
+"""Drawings of heat maps and scans with matplotlib, on a transparent background and in neutral colours."""
 
 from typing import TYPE_CHECKING
 
@@ -25,28 +25,28 @@ _STYLE: "dict[RcKeyType, object]" = {
     "axes.spines.top": False,
     "axes.spines.right": False,
 }
-#: dB below the strongest cell that is still drawn, and the range within which transmitter leakage may outshine it, m.
+#: Dynamic range of heat maps below the strongest cell, dB; range within which transmitter leakage can be stronger, m.
 DEPTH, LEAKAGE = 45.0, 0.25
 _MAP = "magma"
 
 
 def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 2.6) -> tuple[Figure, np.ndarray]:
-    """A figure in the page's style and its axes as an array (rows, columns). It is none of pyplot's: a notebook that
-    draws a report keeps its own figures and backend."""
+    """Return a figure in the page's style, and its axes as an array (rows, columns). It does not use pyplot, so a
+    notebook keeps its own figures and backend."""
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(width, height * rows), layout="constrained")
         return figure, figure.subplots(rows, columns, squeeze=False)
 
 
 def decibels(power: np.ndarray, reference: float | None = None) -> np.ndarray:
-    """Power in dB relative to the reference, or to its own largest value."""
+    """Convert power to dB relative to a reference, or to its maximum."""
     power = np.asarray(power, float)
     top = reference if reference else np.nanmax(power, initial=0.0)
     return 10 * np.log10(np.maximum(power, top * 10 ** (-DEPTH / 10 - 2)) / top) if top > 0 else np.zeros(power.shape)
 
 
 def _relative_to_echoes(power: Float[np.ndarray, "range other"], ranges: Float[np.ndarray, "range"]) -> np.ndarray:
-    """Power in dB relative to the largest beyond the leakage."""
+    """Convert power to dB relative to the maximum beyond the leakage."""
     far = ranges >= LEAKAGE
     return decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
 
@@ -59,7 +59,7 @@ def draw_fan(
     title: str,
     reach: float | None = None,
 ) -> None:
-    """Range-azimuth power from above: forward is up, left is left."""
+    """Draw range-azimuth power from above: forward is up, left is left."""
     level = _relative_to_echoes(power, ranges)
     edges_r, edges_a = _edges(ranges), _edges(azimuths)
     x, y = -edges_r[:, None] * np.sin(edges_a), edges_r[:, None] * np.cos(edges_a)
@@ -78,7 +78,7 @@ def draw_doppler(
     title: str,
     velocity: Float[np.ndarray, "2"] | None = None,
 ) -> None:
-    """Doppler-azimuth power; left is left. `velocity` (forward, left; m/s) adds the ridge v cos(phi - theta)."""
+    """Draw Doppler-azimuth power; left is left. `velocity` (forward, left; m/s) adds the ridge v cos(phi - theta)."""
     x, y = -np.degrees(_edges(azimuths)), _edges(velocities)
     _draw_cells(axis, x, y, decibels(power))
     if velocity is not None and np.isfinite(velocity).all():
@@ -102,13 +102,13 @@ def draw_range_doppler(
     velocities: Float[np.ndarray, "doppler"],
     title: str,
 ) -> None:
-    """Range-Doppler power; closing is right."""
+    """Draw range-Doppler power; closing speeds are to the right."""
     _draw_cells(axis, _edges(velocities), _edges(ranges), _relative_to_echoes(power, ranges))
     axis.set(title=title, xlabel="closing speed, m/s", ylabel="range, m")
 
 
 def draw_scan(axis: Axes, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: str) -> None:
-    """Ends of beams from above, in the axes of `draw_fan`: ``"truth"`` as small dots, else as rings."""
+    """Draw the end points of a scan in the axes of `draw_fan`: ``"truth"`` as small dots, else as rings."""
     hit = np.isfinite(ranges) & (ranges > 0)
     x, y = -ranges[hit] * np.sin(azimuths[hit]), ranges[hit] * np.cos(azimuths[hit])
     if kind == "truth":
@@ -118,7 +118,7 @@ def draw_scan(axis: Axes, azimuths: np.ndarray, ranges: np.ndarray, kind: str, l
 
 
 def draw_profiles(axis: Axes, times: np.ndarray, ranges: np.ndarray, power: Float[np.ndarray, "time range"]) -> None:
-    """Range profiles side by side over time."""
+    """Draw range profiles over time."""
     far = ranges >= LEAKAGE
     level = decibels(power, power[:, far].max() if far.any() and power.size else None)
     _draw_cells(axis, _edges(times), _edges(ranges), level.T)
@@ -126,7 +126,7 @@ def draw_profiles(axis: Axes, times: np.ndarray, ranges: np.ndarray, power: Floa
 
 
 def _edges(values: np.ndarray) -> np.ndarray:
-    """Cell borders of evenly or unevenly spaced middles."""
+    """Return cell edges from evenly or unevenly spaced cell centres."""
     values = np.asarray(values, float)
     if len(values) < 2:
         return np.array([values[0] - 0.5, values[0] + 0.5])
@@ -135,7 +135,7 @@ def _edges(values: np.ndarray) -> np.ndarray:
 
 
 def _draw_cells(axis: Axes, x: np.ndarray, y: np.ndarray, level: np.ndarray) -> None:
-    """Cells of some dB between borders, and what their colours mean."""
+    """Draw cells of a level in dB between edges, with a colour bar."""
     drawn = axis.pcolormesh(x, y, level, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
     bar = axis.figure.colorbar(drawn, ax=axis, pad=0.02, aspect=28)
     bar.outline.set_visible(False)

@@ -1,6 +1,6 @@
-"""A self-contained HTML page: sections of text, tables, pictures and interactive plots, light and dark.
+"""A self-contained HTML page: sections of text, tables, pictures and interactive plots, in light and dark mode.
 
-What it looks like is in ``templates``; whatever stands in a page is escaped, for names and attributes are data.
+The layout is in ``templates``. All content is escaped, because names and attributes are data.
 """
 
 import base64
@@ -18,12 +18,12 @@ if TYPE_CHECKING:  # pages without plots need neither library
     from matplotlib.figure import Figure
     from plotly.graph_objects import Figure as PlotlyFigure
 
-#: Readable on light and dark ground alike: axes and text of plots, and one colour per meaning.
+#: Colours that are legible on light and dark backgrounds: axes and text of plots, grid lines, and one per quantity.
 INK, GRID = "#7d8590", "rgba(125,133,144,0.22)"
-COLORS = {"truth": "#8b949e", "slam": "#e4572e", "odometry": "#2a7fd4", "map": "#9a6fd0", "good": "#2e9e6b"}
-#: Of whatever else is beside each other.
+COLORS = {"truth": "#8b949e", "slam": "#2a7fd4", "odometry": "#e4572e", "map": "#9a6fd0", "good": "#2e9e6b"}
+#: Colours of other methods in a comparison.
 OTHERS = (
-    "#2a7fd4 #9a6fd0 #c2881c #1f9e9e #c04f8a #7d8590 #6d8f2e #8a5a3c #5b6ee1 #d98fb0 #4f9d69 #b5651d #3f6f8f #a3a33b"
+    "#e4572e #9a6fd0 #c2881c #1f9e9e #c04f8a #7d8590 #6d8f2e #8a5a3c #5b6ee1 #d98fb0 #4f9d69 #b5651d #3f6f8f #a3a33b"
 ).split()
 
 _TEMPLATES = Environment(
@@ -34,21 +34,21 @@ STYLE = _TEMPLATES.get_template("style.css").render()
 
 
 class Link(NamedTuple):
-    """What a table's cell may hold instead of words: words that lead to a file beside the page."""
+    """A table cell that links to a file in the folder of the page."""
 
     words: str
     file: str
 
 
 class Page:
-    """Collects sections and writes them as one file that needs nothing else."""
+    """Collects sections and writes them as one self-contained file."""
 
     def __init__(self, title: str, about: str = ""):
         self._title, self._about = title, about
         self._body: list[tuple[str, dict[str, object]]] = []
 
     def _add(self, kind: str, **content: object) -> None:
-        """Something that ``blocks.html`` has a macro for."""
+        """Add a block that ``blocks.html`` has a macro for."""
         self._body.append((kind, content))
 
     def section(self, title: str, about: str = "") -> None:
@@ -56,11 +56,11 @@ class Page:
         self._add("section", title=title, about=about)
 
     def text(self, words: str) -> None:
-        """A paragraph."""
+        """Add a paragraph."""
         self._add("text", words=words)
 
     def headline(self, figures: Iterable[tuple[str, str]]) -> None:
-        """Large figures with what they mean, as (value, words)."""
+        """Add figures in large type, as (value, description)."""
         self._add("headline", figures=list(figures))
 
     def table(
@@ -70,22 +70,22 @@ class Page:
         numbers: Collection[int] = (),
         sortable: bool = False,
     ) -> None:
-        """A table; the columns named by `numbers` are right-aligned, and sort by value where a click sorts."""
+        """Add a table. Columns listed in `numbers` are right-aligned, and sort by value if the table is sortable."""
         self._add("table", head=head if any(head) else (), rows=list(rows), numbers=numbers, sortable=sortable)
 
     def columns(self, parts: Mapping[str, Mapping[str, object]], numbers: Collection[int] = ()) -> None:
-        """Nested plain data as tables of dotted names side by side, by title; `numbers` as of a table."""
+        """Add nested plain data as tables of dotted names side by side, by title; `numbers` as in `table`."""
         tables = [(title, list(_flat(content))) for title, content in parts.items() if content]
         self._add("columns", parts=tables, numbers=numbers)
 
     def picture(self, figure: "Figure", caption: str = "") -> None:
-        """A matplotlib figure as a transparent PNG."""
+        """Add a matplotlib figure as a transparent PNG."""
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=130, transparent=True, bbox_inches="tight")
         self._add("picture", data=base64.b64encode(buffer.getvalue()).decode(), caption=caption)
 
     def plot(self, figure: "PlotlyFigure", height: int = 380) -> None:
-        """An interactive plotly figure in the page's neutral style."""
+        """Add an interactive plotly figure in the page's style."""
         figure.update_layout(
             height=height,
             margin={"l": 60, "r": 20, "t": 30, "b": 50},

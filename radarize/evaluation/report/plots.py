@@ -1,4 +1,4 @@
-"""Interactive plots: lines over time and from above. Names in them are data, not the markup that plotly reads."""
+"""Interactive plots over time and from above. Names in them are escaped, because plotly interprets markup."""
 
 from collections.abc import Iterable
 from html import escape
@@ -13,7 +13,7 @@ from radarize.odometry.observability import Span
 
 
 def panels(*labels: str, x: str = "time, s") -> go.Figure:
-    """Axes below each other, one for each label of an ordinate, over the same abscissa."""
+    """Return a figure with one row of axes for each label of an ordinate, with a common abscissa."""
     figure = make_subplots(rows=len(labels), cols=1, shared_xaxes=True, vertical_spacing=0.06)
     for row, label in enumerate(labels, 1):
         figure.update_yaxes(title=label, row=row, col=1)
@@ -22,7 +22,7 @@ def panels(*labels: str, x: str = "time, s") -> go.Figure:
 
 
 def from_above() -> go.Figure:
-    """Axes on which a metre is a metre both ways."""
+    """Return a figure with x and y axes of equal scale, m."""
     figure = panels("y, m", x="x, m")
     figure.update_xaxes(constrain="domain")
     figure.update_yaxes(scaleanchor="x")
@@ -30,7 +30,7 @@ def from_above() -> go.Figure:
 
 
 def plain(name: str) -> str:
-    """A name that plotly shows as it is."""
+    """Escape a name, so that plotly shows it unchanged."""
     return escape(name)
 
 
@@ -43,9 +43,9 @@ def line(
     row: int = 1,
     **style: object,
 ) -> None:
-    """A line through points, (x, y) each or all x and all y, with gaps where these are not finite.
+    """Draw a line through points (x and y per point, or all x and all y), with gaps at values that are not finite.
 
-    Lines of the same name in several rows have one entry in the legend. `style` is plotly's.
+    Lines of the same name in several rows have one entry in the legend. `style` is passed to plotly.
     """
     x, y = points if isinstance(points, tuple) else points.T[:2]
     name = plain(name)
@@ -56,20 +56,20 @@ def line(
 
 
 def walls(plan: Float[np.ndarray, "segment 4"]) -> Float[np.ndarray, "point 2"]:
-    """A floor plan (x0 y0 x1 y1) as one line with gaps."""
+    """Convert a floor plan of segments (x0 y0 x1 y1) to one line with gaps."""
     ends = np.full((len(plan), 3, 2), np.nan)
     ends[:, :2] = np.reshape(plan, (-1, 2, 2))
     return ends.reshape(-1, 2)
 
 
 def band(figure: go.Figure, x: np.ndarray, low: np.ndarray, high: np.ndarray, name: str, row: int) -> None:
-    """What lies between two lines, filled."""
+    """Fill the area between two lines, in the colour of SLAM."""
     around = np.concatenate([x, x[::-1]]), np.concatenate([high, low[::-1]])
-    fill = {"fill": "toself", "fillcolor": "rgba(228,87,46,0.16)", "hoverinfo": "skip"}
+    fill = {"fill": "toself", "fillcolor": "rgba(42,127,212,0.16)", "hoverinfo": "skip"}
     line(figure, around, name, COLORS["slam"], 0, row, **fill)
 
 
 def shade(figure: go.Figure, spans: Iterable[Span]) -> None:
-    """Grey where odometry was blind; the abscissa is s since the first frame."""
+    """Shade spans in which motion was unobservable; the abscissa is time since the first pose, s."""
     for span in spans:
         figure.add_vrect(x0=span.start_s, x1=span.stop_s, fillcolor=INK, opacity=0.22, line_width=0)

@@ -1,4 +1,4 @@
-"""What a recording holds, real or simulated, as far as its antennas allow, as a page."""
+"""Report of a recording, real or simulated, as an HTML page."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,19 +19,20 @@ from radarize.radar.array import azimuth_row
 from radarize.signal import polar
 from radarize.signal.heatmaps import Heatmaps
 
-#: At most so many profiles over time, and frames with maps: a picture has no room for more.
+#: Maximum number of range profiles over time; number of frames with heat maps.
 _PROFILES, _FRAMES = 400, 3
-#: Echoes named in the mean range profile: the most that stand out by so much, dB.
+#: Maximum number of echoes that are listed from the mean range profile, and their minimum prominence, dB.
 _ECHOES, _PROMINENCE = 10, 4.0
 #: Largest magnitude of a 16-bit sample.
 _FULL_SCALE = 32767
 
 
 def report_recording(path: Path, output: Path | None = None) -> Path:
-    """Draw a recording.
+    """Write a report of a recording.
 
     Args:
-        output: page to write; by default beside the recording, ``.html`` in place of ``.h5``.
+        path: recording.
+        output: page to write; by default the path of the recording with ``.html`` in place of ``.h5``.
 
     Raises:
         InputError: not a recording, an empty or damaged one.
@@ -69,7 +70,7 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
         show_sensors(page, recording, shown)
         if recording.has("truth/pose"):
             _trajectory(page, recording)
-    page.section("What is in it")
+    page.section("Contents")
     page.table(*data_sets(found))
     fields = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
     fields["board"] = str(recording.config.board)
@@ -78,7 +79,7 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
 
 
 def _batches(recording: Recording, count: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Frames spread over the recording, one at a time, as (index, samples, valid)."""
+    """Yield frames spread evenly over the recording, one at a time: index, samples, valid."""
     for index in np.unique(np.linspace(0, len(recording) - 1, count).astype(int)):
         yield index, recording.adc(index, index + 1), recording.valid(index, index + 1)
 
@@ -87,7 +88,7 @@ def _profiles(page: Page, recording: Recording, maps: Heatmaps) -> None:
     profiles = {k: maps.range_profile(adc, valid)[0].numpy() for k, adc, valid in _batches(recording, _PROFILES)}
     power = np.stack(list(profiles.values()))
     times = recording.times[list(profiles)] - recording.times[0]
-    page.section("Range", "Power over range, all antennas and speeds together; dB below the strongest echo.")
+    page.section("Range", "Mean power over range, over all antennas and speeds, in dB relative to the strongest echo.")
     if len(times) > 1:
         figure, axes = canvas(1, height=3.0)
         draw_profiles(axes[0, 0], times, maps.ranges, power)
@@ -111,14 +112,15 @@ def _profiles(page: Page, recording: Recording, maps: Heatmaps) -> None:
 def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
     antennas = len(azimuth_row(recording.config))
     if antennas < 2:
-        page.section("Azimuth", "A single virtual antenna tells no direction: no maps over azimuth.")
+        page.section("Azimuth", "With a single virtual antenna there are no maps over azimuth.")
         return
     about = f"From the longest row of {antennas} virtual antennas"
     if maps.pairs is None:
         about += "; without antennas at two heights there is no elevation-aware map"
     else:
-        about += f", and {len(maps.pairs)} vertical pairs that weaken ceiling and floor"
-    page.section("Azimuth", about + ". From above: forward is up, left is left. dB below the strongest cell.")
+        about += f", and {len(maps.pairs)} vertical pairs that attenuate ceiling and floor"
+    about += ". From above: forward is up, left is left. Level in dB relative to the strongest cell."
+    page.section("Azimuth", about)
     for index, adc, valid in _batches(recording, _FRAMES):
         fans: dict[str, Callable[[np.ndarray, np.ndarray], torch.Tensor]] = {"range-azimuth": maps.range_azimuth}
         if maps.pairs is not None:
@@ -136,7 +138,10 @@ def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
 
 
 def _pictures(page: Page, recording: Recording, shown: Int[np.ndarray, "picture"]) -> None:
-    about = "Pictures, no samples. From above: forward is up, left is left. dB below the strongest cell."
+    about = (
+        "Polar pictures; the recording has no samples. From above: forward is up, left is left. Level in dB relative "
+        "to the strongest cell."
+    )
     page.section("Azimuth", about)
     figure, axes = canvas(len(shown))
     for axis, index in zip(axes[0], shown, strict=True):
@@ -167,7 +172,7 @@ def _samples(page: Page, recording: Recording) -> None:
     page.plot(figure, height=300)
     lost = (~recording.valid(0, len(recording))).sum(axis=(1, 2))
     if lost.any():
-        figure = panels("lost chirps a frame")
+        figure = panels("lost chirps per frame")
         figure.add_bar(x=recording.times - recording.times[0], y=lost, marker={"color": COLORS["slam"]})
         page.plot(figure, height=240)
 

@@ -1,4 +1,4 @@
-"""A run as a page: errors against the truth, map, velocities, heat maps, and all that is needed to repeat it."""
+"""Report of a run as an HTML page: errors, map, velocities, heat maps, and everything needed to repeat the run."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,11 +20,12 @@ _NAMES = {"slam": "SLAM", "odometry": "odometry"}
 
 
 def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = ()) -> Path:
-    """Draw a run, with its errors where it knows the truth. Nothing but the page is written.
+    """Write a report of a run, with its errors if it has a truth. No other file is written.
 
     Args:
+        run: folder of the run.
         output: file to write; by default ``report.html`` in the folder.
-        beside: other runs of the same recording, to compare with.
+        beside: other runs of the same recording for comparison.
 
     Raises:
         InputError: not a run, or a damaged one.
@@ -32,26 +33,26 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     folder, others = RunFolder(run), [RunFolder(other) for other in beside]
     errors = trajectory_errors(folder) if folder.has("reference.tum") else {}
     metrics = evaluate(folder, errors=errors) if errors else {}
-    blind = folder.unobservable_spans
+    unobservable = folder.unobservable_spans
 
     page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:
         _result(page, metrics)
     for sentence in folder.warnings:
         page.text(f"Warning: {sentence}.")
-    if blind:
-        sentence, table = words.blindness(blind)
+    if unobservable:
+        sentence, table = words.unobservable(unobservable)
         page.text(sentence)
-        if table.rows and not folder.health:  # of a version that gave no advice
+        if table.rows and not folder.health:  # the table of health has the same spans
             page.table(*table, sortable=True)
     if folder.health:
         page.table(*words.health(folder.health), sortable=True)
     if errors and others:
-        page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
+        page.section("Comparison with other methods", "Errors of odometry and SLAM on the same recording.")
         rows = [(methods(folder), metrics), *((methods(other), evaluate(other)) for other in others)]
         page.table(*words.beside(rows), sortable=True)
     _plan(page, folder, errors, others)
-    spans = blind.spans if blind else []
+    spans = unobservable.spans if unobservable else []
     start = folder.trajectory[0][0]
     if errors:
         _over_time(page, errors, start, spans)
@@ -64,9 +65,9 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
 
 
 def methods(run: RunFolder) -> str:
-    """What a run was made with, in short."""
-    told = ("odometry", "scans", "frames")
-    return " + ".join(run.methods[name] for name in told if name in run.methods) or run.path.name
+    """Return the methods of a run as a short name."""
+    shown = ("odometry", "scans", "frames")
+    return " + ".join(run.methods[name] for name in shown if name in run.methods) or run.path.name
 
 
 def _about(run: RunFolder, errors: dict[str, TrajectoryErrors]) -> str:
@@ -96,11 +97,11 @@ def _result(page: Page, metrics: dict) -> None:
 
 
 def _plan(page: Page, run: RunFolder, errors: dict[str, TrajectoryErrors], beside: Sequence[RunFolder]) -> None:
-    """Trajectories, map and floor plan from above, in the truth's frame if there is one."""
+    """Draw trajectories, map and floor plan from above, in the true frame if there is a truth."""
     page.section(
         "Trajectory and map",
-        "From above, one metre is one metre both ways. Click a name to hide or show it."
-        + (" Each trajectory is laid upon the truth, the map along with SLAM's." if errors else ""),
+        "Trajectories and map from above. Click a name to hide or show it."
+        + (" Each trajectory is aligned with the truth; the map has the alignment of SLAM." if errors else ""),
     )
     figure = from_above()
     turn, shift = (errors["slam"].turn, errors["slam"].shift) if errors else (np.eye(3), np.zeros(3))
@@ -124,10 +125,9 @@ def _plan(page: Page, run: RunFolder, errors: dict[str, TrajectoryErrors], besid
 def _over_time(page: Page, errors: dict[str, TrajectoryErrors], start: float, spans: Sequence) -> None:
     page.section(
         "Error over time",
-        "Distance to the truth and difference of heading, after alignment."
-        + (" Shaded: odometry was blind." if spans else ""),
+        "Position and heading error after alignment." + (" Shaded: heading or velocity unobservable." if spans else ""),
     )
-    figure = panels("position, m", "heading, deg")
+    figure = panels("position error, m", "heading error, deg")
     for name, item in errors.items():
         time, degrees = item.time - start, np.degrees(item.rotation_errors)
         line(figure, (time, item.position_errors), _NAMES[name], COLORS[name])
@@ -141,9 +141,9 @@ def _velocities(page: Page, scans: Scans, start: float, spans: Sequence) -> None
     true, covariance = scans.get("truth/velocity"), scans.get("velocity_covariance")
     page.section(
         "Velocity",
-        "Estimated from single frames" + (", against the truth." if true is not None else ".")
-        + (" The band is two standard deviations." if covariance is not None else "")
-        + (" Shaded: odometry was blind." if spans else ""),
+        "Velocity of the sensor, estimated from single frames" + (", and the truth." if true is not None else ".")
+        + (" Band: two estimated standard deviations." if covariance is not None else "")
+        + (" Shaded: heading or velocity unobservable." if spans else ""),
     )  # fmt: skip
     figure = panels("forward, m/s", "left, m/s")
     time = scans["time"] - start
@@ -157,7 +157,7 @@ def _velocities(page: Page, scans: Scans, start: float, spans: Sequence) -> None
             shown = np.concatenate([estimate, true[:, k]])
         line(figure, (time, estimate), "estimate", COLORS["slam"], 1.3, row=k + 1)
         if np.isfinite(shown).any():
-            # A few outliers must not flatten the rest.
+            # Outliers do not determine the limits of the axis.
             low, high = np.nanpercentile(np.where(np.isfinite(shown), shown, np.nan), [0.5, 99.5])
             margin = 0.15 * (high - low) + 0.05
             figure.update_yaxes(range=[low - margin, high + margin], row=k + 1, col=1)
@@ -169,10 +169,10 @@ def _heatmaps(page: Page, scans: Scans) -> None:
     true_velocity = scans.get("truth/velocity")
     page.section(
         "Heat maps and scans",
-        "Left: range and azimuth from above, with the scan that was made of it (rings) on the true surfaces (dots). "
-        "Middle: the same from antenna pairs that pass the horizon and weaken ceiling and floor. Right: closing speed "
-        "over azimuth; a static world lies on the dashed ridge v cos(φ − θ) of the "
-        f"{'estimated' if true_velocity is None else 'true'} velocity. dB below the strongest cell.",
+        "Left: range-azimuth map from above, with the estimated scan (rings) and true surfaces (dots). Middle: "
+        "range-azimuth map of vertical antenna pairs, which attenuate ceiling and floor. Right: Doppler-azimuth map; "
+        "static surfaces lie on the dashed ridge v cos(φ − θ) of the "
+        f"{'estimated' if true_velocity is None else 'true'} velocity. Level in dB relative to the strongest cell.",
     )
     ranges, azimuths = scans["heatmaps/ranges"], scans["heatmaps/azimuths"]
     fans = {"range_azimuth": "range-azimuth", "elevation_aware": "elevation aware"}

@@ -1,4 +1,4 @@
-"""Pictures of what sensors beside the radar recorded, for the page of a recording."""
+"""Figures of the other sensors of a recording, for its report."""
 
 import numpy as np
 from jaxtyping import Int
@@ -10,17 +10,17 @@ from radarize.evaluation.report.drawings import canvas
 from radarize.evaluation.report.page import COLORS, Page
 from radarize.io.recording import Recording
 
-#: Value of cells that no cause fills (/truth/cause).
+#: Value of cells without a path type in /truth/cause.
 _NONE = 255
 
 
 def show_sensors(page: Page, recording: Recording, frames: Int[np.ndarray, "frame"]) -> None:
-    """Sections for whatever there is of pictures at some frames, IMU and tracking camera."""
+    """Add sections for the sensors of a recording: pictures at some frames, IMU, tracking camera."""
     drawers = {
-        "truth/depth": ("Depth camera", "Nearer is darker; white has no value.", _depth),
+        "truth/depth": ("Depth camera", "Distance along the optical axis, m; white: unknown.", _depth),
         "truth/occupancy": ("Occupancy label", "From above: free, first surface, unknown behind it.", _occupancy),
-        "truth/cause": ("Strongest cause of every cell", "", _cause),
-        "points/cloud": ("Point cloud", "From above, by closing speed, m/s.", _points),
+        "truth/cause": ("Path type of the strongest echo in each cell", "", _cause),
+        "points/cloud": ("Point cloud", "From above; colour: closing speed, m/s.", _points),
     }
     for name, (title, about, draw) in drawers.items():
         if recording.has(name):
@@ -31,12 +31,12 @@ def show_sensors(page: Page, recording: Recording, frames: Int[np.ndarray, "fram
                 axis.set_title(f"frame {frame}")
             page.picture(figure)
     if recording.has("imu/time"):
-        page.section("IMU", "Specific force and angular velocity; x, y, z.")
+        page.section("IMU", "Specific force and angular velocity (x, y, z).")
         names = ("imu/accelerometer", "imu/gyroscope")
         lines = {f"{n.removeprefix('imu/')}, {recording.describe(n)['unit']}": recording.read(n) for n in names}
         _draw_lines(page, recording.read("imu/time"), lines)
     if recording.has("tracking/pose") and recording.has("tracking/true_pose"):
-        page.section("Tracking camera", "How far its poses are off: position, and rotation vector.")
+        page.section("Tracking camera", "Errors of its poses: position (x, y, z), and rotation vector.")
         time, tracked, truth = (recording.read(f"tracking/{n}") for n in ("time", "pose", "true_pose"))
         turn = (Rotation.from_quat(tracked[:, 3:]) * Rotation.from_quat(truth[:, 3:]).inv()).as_rotvec()
         off = tracked[:, :3] - truth[:, :3]
@@ -74,10 +74,10 @@ def _points(axis: Axes, recording: Recording, cloud: np.ndarray) -> None:
 
 
 def _draw_lines(page: Page, time: np.ndarray, values: dict[str, np.ndarray]) -> None:
-    """Axes for each name with x, y, z over time."""
+    """Draw axes for each name with x, y, z over time."""
     figure, axes = canvas(len(values))
     for axis, (label, columns) in zip(axes[0], values.items(), strict=True):
-        for column, name in zip(columns.T, ("slam", "good", "odometry"), strict=True):
+        for column, name in zip(columns.T, ("odometry", "good", "slam"), strict=True):
             axis.plot(time, column, color=COLORS[name], lw=0.7)
         axis.set(xlabel="time, s", ylabel=label)
     page.picture(figure)

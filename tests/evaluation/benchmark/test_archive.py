@@ -1,4 +1,4 @@
-"""The Radarize data set's bags: imported once, with the paper's buildings, platforms and splits, and compared on."""
+"""Import of the Radarize data set's bags with the paper's buildings, platforms and splits, and a benchmark on them."""
 
 import json
 import shutil
@@ -19,7 +19,7 @@ from radarize.io.yamlfile import read_yaml
 from radarize.radar.presets import PRESETS
 from tests.evaluation.benchmark.rooms import write_room
 
-#: Of the artefact's test parts: random-0; random-0; none.
+#: Recordings that are test recordings of split random-0, random-0, and of no random split.
 NAMES = "bot_ece_basement_1", "cart_sc_0", "walk_csl_upper_9"
 
 
@@ -35,7 +35,7 @@ def archive(tmp_path_factory):
 
 
 def _with_the_archives_radar(room):
-    """The same walk with samples of the preset, 40 frames at 30 Hz."""
+    """Write the same walk with samples of the preset, 40 frames at 30 Hz."""
     config = PRESETS["radarize"]
     rng = np.random.default_rng(0)
     path = room.with_suffix(".full.h5")
@@ -89,8 +89,8 @@ def test_splits_are_the_artefacts():
         assert not set(parts["train"] + parts["validation"]) & set(parts["test"])
 
 
-def test_every_recording_of_the_artefact_tests_at_most_as_often_as_it_is_drawn():
-    """126 recordings; a split has 27 to 29 that test (20 %) and 12 or 13 that validate (10 %)."""
+def test_sizes_of_the_random_splits():
+    """Of 126 recordings, a split has 27 to 29 for test (20 %) and 12 or 13 for validation (10 %)."""
     listed = read_yaml(Path(archive_module.__file__).with_name("archive.yaml"))
     assert len(listed) == 126
     for k in range(5):
@@ -98,8 +98,8 @@ def test_every_recording_of_the_artefact_tests_at_most_as_often_as_it_is_drawn()
         assert 27 <= parts.count("e") <= 29 and 12 <= parts.count("v") <= 13 and 83 <= parts.count("t") <= 84
 
 
-def test_the_papers_tables_come_of_a_folder_of_bags(archive, tmp_path):
-    """The path is known to 1e-5 m; of noise alone, odometry stands still, and its error is that of a point."""
+def test_the_papers_tables_from_a_folder_of_bags(archive, tmp_path):
+    """The imported path agrees with the true one; samples are noise, so odometry stays at rest."""
     found = benchmark("odometry", archive, tmp_path, Options(["doppler"]))["odometry"]
     (table,) = [t for t in found.tables if "paper's protocol" in t.title]
     (row,) = table.frame.to_dict("records")

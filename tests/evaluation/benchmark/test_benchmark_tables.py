@@ -1,4 +1,4 @@
-"""What tables make of runs: grouping, pooling, means, text; and what a page must say."""
+"""Tables of runs (grouping, pooling, means, text), and the provenance of results."""
 
 import re
 from dataclasses import replace
@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from radarize.evaluation.benchmark import odometry, runtime
-from radarize.evaluation.benchmark.choices import CHOICES, SETS, helped
+from radarize.evaluation.benchmark.choices import CHOICES, SETS, tuned_on
 from radarize.evaluation.benchmark.dataset import DataSet, groups
-from radarize.evaluation.benchmark.followed import FrameErrors
+from radarize.evaluation.benchmark.frame_errors import FrameErrors
 from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, commit
 from radarize.evaluation.benchmark.table import PAPER, Table
 from radarize.evaluation.metrics import evaluate_trajectory
@@ -65,7 +65,7 @@ def test_folders_of_data_sets_make_one(rooms, tmp_path):
 
 
 def followed(length: float, speed: float, turn: float, frames: int = 40) -> tuple[FrameErrors, dict]:
-    """A straight walk that odometry takes for faster by `speed` m/s and turning by `turn` rad a frame; its errors."""
+    """Return a straight walk with an odometry error of `speed` m/s and `turn` rad per frame, and its errors."""
     times, zero = np.arange(frames) / 30, np.zeros(frames)
     true = np.column_stack([np.linspace(0, length, frames), zero, zero])
     seen = true * [1.1, 1, 1]
@@ -94,7 +94,7 @@ def test_frames_are_pooled_and_trajectories_averaged():
     assert means[0] == pytest.approx(0.1 * 4 / 4, rel=0.05)  # a tenth too long, about its middle
     assert row["NEES velocity (median)"].startswith("2.50 (")  # (1 + 9) / 2 deviations squared, one of two dimensions
     assert row["NEES yaw step"] == pytest.approx(5)
-    assert row["NEES yaw over 0.27 s"] == pytest.approx(40)  # errors that all go one way
+    assert row["NEES yaw over 0.27 s"] == pytest.approx(40)  # all errors have the same sign
     assert row["RE per metre, m, rad"].startswith("0.1")
 
 
@@ -115,14 +115,15 @@ RESULTS = Results(
 )
 
 
-def test_a_page_says_what_it_is_worth_and_can_be_read_again(tmp_path):
+def test_results_have_their_provenance_and_can_be_read_again(tmp_path):
     assert TABLE.numbers() == (1, 2)
     text = RESULTS.write(tmp_path, "x").read_text()
     assert "| a | 0.1235 | 3 |\n| b | - | - |\n\n- A note.\n" in text and text.startswith("# Two\n\n## One\n")
     assert text.endswith(
-        "- Of all.\n- **Data**: d, 1 recordings, 12 m walked, all simulated, seed 5; 1 of 1 helped to choose scans and "
-        "the back end's preset radar.\n- **Networks**: rotation, 1,234,567 parameters, trained on training (random-0), "
-        "5 epochs.\n- **Command**: `c`.\n- **Machine**: processor abacus, cores 2, version 0, commit abc (clean).\n"
+        "- Of all.\n- **Data**: d, 1 recordings, 12 m walked, all simulated, seed 5; 1 of 1 in the tuning set of scans "
+        "and the back end's preset radar.\n- **Networks**: rotation, 1,234,567 parameters, trained on training "
+        "(random-0), 5 epochs.\n- **Command**: `c`.\n- **Machine**: processor abacus, cores 2, version 0, commit abc "
+        "(clean).\n"
     )
     assert Results.read(tmp_path / "x.json").markdown() == text
     lone = replace(RESULTS, tables=[replace(TABLE, title="Two")])
@@ -138,7 +139,7 @@ def test_results_without_their_origin_are_refused(missing):
 
 
 @pytest.mark.parametrize("row", [{"who": "ours", "paper: ATE m": 1.0}, {"who": "paper, RTX 3090", "ms": 1.0}])
-def test_the_papers_figures_say_that_they_are_of_real_recordings(row):
+def test_the_papers_results_are_marked_as_of_real_recordings(row):
     with pytest.raises(ValueError, match="figures of the paper"):
         Table("T", [row])
     results = replace(RESULTS, tables=[Table("T", [row], beside=(PAPER,))])
@@ -153,27 +154,27 @@ def test_a_page_of_another_layout_is_refused(tmp_path):
         Results.read(path)
 
 
-def test_a_recording_tells_its_way_and_whether_it_is_real(rooms):
+def test_path_length_and_origin_of_a_recording(rooms):
     (walk, *_) = (case.walk for case in rooms.cases)
     assert walk.scene == "A_0" and walk.seed is None and not walk.simulated and 0 < walk.metres < 1
     data = Data("d", (walk, replace(walk, simulated=True, metres=None)))
     assert "2 recordings, 0 m walked (1 without true poses), 1 simulated, 1 real" in data.sentence
 
 
-def test_which_recordings_helped_to_choose_is_looked_up():
+def test_recordings_of_tuning_sets_are_listed():
     tasks = Specification.load("evaluation").tasks
     assert [task.seed for task in tasks] == [seed for seeds in SETS["EVALUATION"].values() for seed in seeds]
     walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in SETS["EVALUATION"].items() for seed in seeds]
-    said = helped(walks)
-    assert len(said) == 2 and said[0].startswith("at most 4 of 15 helped to choose the probability")
-    assert helped(walks[:2])[1].startswith("at most 2 of 2")
+    listed = tuned_on(walks)
+    assert len(listed) == 2 and listed[0].startswith("at most 4 of 15 in the tuning set of the probability")
+    assert tuned_on(walks[:2])[1].startswith("at most 2 of 2")
     others = [replace(walk, seed=1) for walk in walks]
-    assert helped(others) == ["none helped to choose settings", "other walks through A_0, B_0, C_0, D_0, office did"]
-    assert helped([NamedWalk("elsewhere", 1, 1.0, True)]) == ["none helped to choose settings"]
+    assert tuned_on(others) == ["none in a tuning set", "other walks through A_0, B_0, C_0, D_0, office are"]
+    assert tuned_on([NamedWalk("elsewhere", 1, 1.0, True)]) == ["none in a tuning set"]
     assert all(choice.recordings for choice in CHOICES)
 
 
-def test_networks_tell_their_size_and_training():
+def test_size_and_training_of_networks():
     network = UsedNetwork.of(Weights(None).of("rotation"))
     assert (
         network.sentence.startswith("rotation, width 16, 70")
@@ -193,7 +194,7 @@ def test_a_commit_is_of_the_sources_that_run(tmp_path):
 def test_ahead_or_where_not():
     rows = [{"who": "ours", "ATE m": 1.0, "RE m": 2.0}, {"who": "b", "ATE m": 3.0, "RE m": 1.5}]
     rows.append({"who": "c", "ATE m": None, "RE m": np.nan})
-    assert Table("T", rows).ahead(0, "ours") == "ours is behind in RE m (2, best 1.5)."
+    assert Table("T", rows).ahead(0, "ours") == ("ours has larger errors than the best method in RE m (2, best 1.5).")
     assert Table("T", [rows[0] | {"RE m": 1.0}, *rows[1:]]).ahead(0, "ours") == (
         "ours has the least error in every column."
     )

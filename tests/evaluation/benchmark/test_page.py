@@ -1,4 +1,4 @@
-"""A benchmark's page in a browser: it sorts, toggles, and complains of nothing."""
+"""A benchmark's page in a browser: tables sort, lines toggle, and there are no errors."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ SHOWN = "document.getElementById('plot-1').data.map(line => line.visible)"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
-    """Pages of two methods whose errors are not alike, and one that cannot run."""
+    """Pages of two methods with different errors, and one method that cannot run."""
     data, output = write_rooms(tmp_path_factory.mktemp("rooms")), tmp_path_factory.mktemp("page")
     with pytest.MonkeyPatch.context() as patch:
         methods = [*add(patch), "doppler", "segmentation"]
@@ -31,7 +31,7 @@ def test_it_sorts_and_toggles(folder, tmp_path):
     with Browser((folder / "buildings.html").as_uri(), tmp_path / "profile") as browser:
         browser.wait("document.querySelectorAll('.js-plotly-plot').length === 3")
         assert browser.evaluate("document.querySelector('h1').textContent") == "SLAM in unseen buildings"
-        # Figures by value, either way round, and words by letter.
+        # Numbers sort by value, in both directions, and text alphabetically.
         heads = "[...document.querySelector('table.sortable').rows[0].cells].map(c => c.textContent)"
         column = browser.evaluate(heads).index("ATE m")
         before = browser.evaluate(CELLS.format(0, column))
@@ -40,7 +40,7 @@ def test_it_sorts_and_toggles(folder, tmp_path):
             assert browser.evaluate(CELLS.format(0, column)) == sorted(before, key=float, reverse=down)
         browser.evaluate(CLICK.format(0, 2))
         assert browser.evaluate(CELLS.format(0, 2)) == ["A", "A", "B", "B", "mean", "mean"]
-        # The menu of the first plot chooses a recording: three lines of each of three.
+        # The menu of the first plot selects a recording: three lines for each of three recordings.
         shown = browser.evaluate(SHOWN)
         assert shown == [True] * 3 + [False] * 6
         assert browser.evaluate("document.querySelectorAll('#plot-1 .updatemenu-container').length") == 1

@@ -1,19 +1,20 @@
-"""What odometry claims of its poses."""
+"""NEES of the relative motions of odometry."""
 
 from functools import partial
 
 import numpy as np
 import pytest
 
-from radarize.evaluation.benchmark.walks import pose_nees
+from radarize.evaluation.benchmark.walks import motion_nees
 from radarize.io.pose import compose
 from radarize.odometry.uncertainty import ErrorModel, MotionCovariance
 
 FRAMES, WALKS = 40, 400
 
 
-def test_claims_of_steps_add_up_to_those_of_poses(monkeypatch):
-    """Steps of a walk in a curve whose errors are drawn as claimed: 1 over any span, and 4 if they claim half."""
+def test_nees_of_motions_with_the_covariances_of_steps(monkeypatch):
+    """Errors of the steps of a curved walk are drawn from their covariances: the NEES is 1 over windows of any length,
+    and 4 with a quarter of the covariances."""
     monkeypatch.setattr("radarize.odometry.uncertainty.MotionCovariance", partial(MotionCovariance, scale=0.0))
     rng = np.random.default_rng(0)
     half = np.array([[0.002, 0.0, 0.0], [0.0006, 0.001, 0.0], [0.0, 0.0004, 0.001]])
@@ -24,8 +25,8 @@ def test_claims_of_steps_add_up_to_those_of_poses(monkeypatch):
         poses[k] = compose(compose(poses[k - 1], step), rng.normal(size=(WALKS, 3)) @ half.T)
     for length in (5, FRAMES - 1):
         walks = range(WALKS)
-        claims = ErrorModel.independent(steps)
-        found = [pose_nees(poses[:, walk], true[:, walk], claims, range(1), length) for walk in walks]
+        errors = ErrorModel.independent(steps)
+        found = [motion_nees(poses[:, walk], true[:, walk], errors, range(1), length) for walk in walks]
         assert np.mean(found) == pytest.approx(1, abs=0.1)
-    quarter = pose_nees(poses[:, -1], true[:, -1], ErrorModel.independent(steps / 4), range(1), FRAMES - 1)
+    quarter = motion_nees(poses[:, -1], true[:, -1], ErrorModel.independent(steps / 4), range(1), FRAMES - 1)
     assert quarter == pytest.approx(4 * found[-1])

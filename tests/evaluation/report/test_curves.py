@@ -1,13 +1,14 @@
-"""Curves over what was varied."""
+"""Plots of metrics over a varied quantity."""
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pytest
 
 from radarize.evaluation.report.curves import curves
 
 
 def test_curves():
-    """A row for each figure, a column for each place, a line for each method, in the order of severity."""
+    """There is a row for each metric, a column for each place, and a line for each method, in order of severity."""
     rows = [
         {"stress": place, "severity": level, "scans": scans, "ghosts": 0.1 * level, "missed": None if level else 0.5}
         for place in ("corner", "shelves")
@@ -26,8 +27,22 @@ def test_curves():
     plt.close(figure)
 
 
+def test_axes_have_quantity_and_unit_and_percentages_end_at_100():
+    rows = [
+        {"ablation": name, "value": value, "scans": "cfar", "missed": 0.98, "odometry": 1.0}
+        for name, value in (("bandwidth", 1.68e9), ("bandwidth", 3.36e9), ("mine", 2))
+    ]
+    quantities = {"bandwidth": ("bandwidth, GHz", 1e-9)}
+    figure = curves(rows, over="value", panel="ablation", names=("missed", "odometry"), quantities=quantities)
+    axes = np.array(figure.axes).reshape(2, 2)
+    assert [axis.get_xlabel() for axis in axes[1]] == ["bandwidth, GHz", "value"]
+    assert [label.get_text() for label in axes[1, 0].get_xticklabels()] == ["1.68", "3.36"]
+    assert axes[0, 0].get_ylim() == (0, 100) and axes[1, 0].get_ylim() == pytest.approx((0, 1.06))
+    plt.close(figure)
+
+
 def test_curves_over_names():
-    """What has no number stands in the order it is given."""
+    """Values without a number are in the order of the rows."""
     rows = [
         {"ablation": "device", "value": name, "scans": "first-echo", "odometry": error}
         for name, error in (("IWR6843ISK", 0.2), ("IWR1843BOOST", 0.1))

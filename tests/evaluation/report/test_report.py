@@ -1,4 +1,4 @@
-"""Reports: whole, self-contained, and drawn by a browser without an error."""
+"""Reports are complete and self-contained, and a browser shows them without errors."""
 
 import json
 import re
@@ -18,12 +18,12 @@ from tests.capture.browser import CHROMIUM, Browser
 from tests.evaluation.fake_run import write_run
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (apt-get install chromium)")
-#: What a run with two gaps says of itself.
-BLIND = {
+#: Entry of `run.json` for a run with two spans in which motion was unobservable.
+SPANS = {
     "share_of_way": 0.125,
     "way_m": 2.25,
     "spans": [
-        {"start_s": 3.0, "stop_s": 4.5, "way_m": 1.5, "why": "no match believed"},
+        {"start_s": 3.0, "stop_s": 4.5, "way_m": 1.5, "why": "no turn"},
         {"start_s": 10.0, "stop_s": 11.0, "way_m": 0.75, "why": "no <velocity>"},
     ],
 }
@@ -79,7 +79,7 @@ def test_a_browser_draws_it_without_errors(page, request, tmp_path):
         assert browser.errors == []
 
 
-def test_run_page_tells_the_result(run_page):
+def test_run_page_shows_the_result(run_page):
     text = run_page.read_text()
     for words in ("Trajectory and map", "Error over time", "Velocity", "Heat maps and scans", "first-echo", "2.13.0"):
         assert words in text
@@ -88,15 +88,15 @@ def test_run_page_tells_the_result(run_page):
     assert not re.search(r"\b(nan|None|inf)\b", shown)
 
 
-def tell(run: Path, **facts) -> Path:
-    """Add to what a run says of itself."""
+def with_facts(run: Path, **facts) -> Path:
+    """Add entries to a run's `run.json`."""
     path = run / "run.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | facts))
     return run
 
 
 def listing(*folders: Path) -> dict[str, tuple[int, bytes]]:
-    """All files with their times and contents."""
+    """Return all files with their times and contents."""
     files = [path for folder in folders for path in folder.rglob("*") if path.is_file()]
     return {str(path): (path.stat().st_mtime_ns, path.read_bytes()) for path in files}
 
@@ -105,7 +105,7 @@ def test_comparing_runs_writes_into_none_of_them(tmp_path):
     run, other = write_run(tmp_path / "run"), write_run(tmp_path / "other", seed=1)
     before = listing(run, other)
     page = report_run(run, tmp_path / "page.html", [other])
-    assert "Beside other methods" in page.read_text()
+    assert "Comparison with other methods" in page.read_text()
     assert listing(run, other) == before
     report_run(run, None, [other])
     assert listing(other).items() <= before.items()
@@ -114,10 +114,10 @@ def test_comparing_runs_writes_into_none_of_them(tmp_path):
 
 @needs_browser
 def test_names_are_data(tmp_path):
-    """Of recordings, methods, attributes: neither a browser nor a plot takes them for markup."""
+    """Names of recordings, methods and attributes are not interpreted as markup, neither by a browser nor by plotly."""
     evil = "<script>window.hacked = 1</script><b>[imu]</b> $x_"
-    run = tell(write_run(tmp_path / "run"), recording=evil, methods={"odometry": evil, "scans": "'\"&amp;"})
-    other = tell(write_run(tmp_path / "other", seed=1), methods={"odometry": evil, "scans": "[/x]"})
+    run = with_facts(write_run(tmp_path / "run"), recording=evil, methods={"odometry": evil, "scans": "'\"&amp;"})
+    other = with_facts(write_run(tmp_path / "other", seed=1), methods={"odometry": evil, "scans": "[/x]"})
     with Browser(report_run(run, None, [other]).as_uri(), tmp_path / "a") as browser:
         browser.wait("document.querySelectorAll('.js-plotly-plot').length === 3")
         assert browser.evaluate("window.hacked") is None and browser.errors == []
@@ -140,7 +140,7 @@ def test_names_are_data(tmp_path):
 
 @needs_browser
 def test_methods_beside_each_other_sort(tmp_path):
-    runs = [tell(write_run(tmp_path / n, seed=k), methods={"odometry": n}) for k, n in enumerate("bca")]
+    runs = [with_facts(write_run(tmp_path / n, seed=k), methods={"odometry": n}) for k, n in enumerate("bca")]
     with Browser(report_run(runs[0], None, runs[1:]).as_uri(), tmp_path / "profile") as browser:
         browser.wait("document.readyState === 'complete'")
         rows = "document.querySelector('table.sortable').rows"
@@ -153,48 +153,48 @@ def test_methods_beside_each_other_sort(tmp_path):
 
 
 @needs_browser
-def test_where_odometry_was_blind_is_told_and_shaded(tmp_path):
-    page = report_run(tell(write_run(tmp_path / "run"), blind=BLIND))
+def test_spans_with_unobservable_motion_are_listed_and_shaded(tmp_path):
+    page = report_run(with_facts(write_run(tmp_path / "run"), **{"blind": SPANS}))
     with Browser(page.as_uri(), tmp_path / "profile") as browser:
         browser.wait("document.querySelectorAll('.js-plotly-plot').length === 3")
         text = browser.evaluate("document.body.innerText")
-        assert "over 2.2 m, 12 % of the way" in text and "no match believed" in text and "no <velocity>" in text
+        assert "on 2.2 m, 12 % of the path" in text and "no turn" in text and "no <velocity>" in text
         for plot in ("plot-2", "plot-3"):  # errors, velocities: both of two rows
             shapes = browser.evaluate(f"document.getElementById('{plot}').layout.shapes.map(s => [s.x0, s.x1])")
             assert sorted(map(tuple, shapes)) == [(3.0, 4.5)] * 2 + [(10.0, 11.0)] * 2
 
 
-def test_blind_spans_are_counted_from_the_first_pose(tmp_path):
-    """The run has stamps of its clock."""
+def test_times_of_unobservable_spans_start_at_the_first_pose(tmp_path):
+    """The run has time stamps of the radar's clock."""
     clock, run = 1.7e9, write_run(tmp_path / "run")
     poses = np.loadtxt(run / "trajectory.tum")
     np.savetxt(run / "trajectory.tum", poses + [clock, *[0] * 7], fmt="%.9f")
     assert RunFolder(run).unobservable_spans is None
-    spans = [span | {"start_s": span["start_s"] + clock, "stop_s": span["stop_s"] + clock} for span in BLIND["spans"]]
-    assert RunFolder(tell(run, blind=BLIND | {"spans": spans})).unobservable_spans.model_dump() == BLIND
+    spans = [span | {"start_s": span["start_s"] + clock, "stop_s": span["stop_s"] + clock} for span in SPANS["spans"]]
+    assert RunFolder(with_facts(run, **{"blind": SPANS | {"spans": spans}})).unobservable_spans.model_dump() == SPANS
 
 
-def test_blind_spans_stand_in_one_table(tmp_path):
-    """With advice, where there is some."""
+def test_unobservable_spans_are_in_one_table(tmp_path):
+    """The table of health, which has advice, replaces the table of spans."""
     found = [{"kind": "blind", "start_s": 3.0, "stop_s": 4.5, "advice": "turn more slowly"}]
-    run = tell(write_run(tmp_path / "run"), blind=BLIND)
-    assert "blind from, s" in report_run(run).read_text()
-    shown = report_run(tell(run, blind=BLIND, health=found)).read_text()
-    assert "blind from, s" not in shown and "turn more slowly" in shown and "12 % of the way" in shown
+    run = with_facts(write_run(tmp_path / "run"), **{"blind": SPANS})
+    assert "unobservable from, s" in report_run(run).read_text()
+    shown = report_run(with_facts(run, health=found)).read_text()
+    assert "unobservable from, s" not in shown and "turn more slowly" in shown and "12 % of the path" in shown
 
 
-def test_blindness_is_told_without_truth_too(tmp_path):
-    seeing = {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
-    shown = report_run(tell(write_run(tmp_path / "run", truth=False), blind=seeing)).read_text()
-    assert "Odometry was blind nowhere." in shown
+def test_observability_is_reported_without_truth_too(tmp_path):
+    none = {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
+    shown = report_run(with_facts(write_run(tmp_path / "run", truth=False), **{"blind": none})).read_text()
+    assert "Heading and velocity were observable on the whole path." in shown
     old = report_run(write_run(tmp_path / "old", truth=False)).read_text()
-    assert "blind" not in re.sub(r"<script.*?</script>", "", old, flags=re.S)
-    with pytest.raises(InputError, match=r"run.json: blind.way_m is .*-1"):
-        report_run(tell(tmp_path / "run", blind=seeing | {"way_m": -1}))
+    assert "observable" not in re.sub(r"<script.*?</script>", "", old, flags=re.S)
+    with pytest.raises(InputError, match=r"run.json: \w+.way_m is .*-1"):
+        report_run(with_facts(tmp_path / "run", **{"blind": none | {"way_m": -1}}))
 
 
 def test_run_without_truth_is_drawn_too(tmp_path):
-    text = report_run(write_run(tmp_path / "blind", truth=False)).read_text()
+    text = report_run(write_run(tmp_path / "run", truth=False)).read_text()
     assert "Trajectory and map" in text and "Error over time" not in text
 
 
@@ -202,7 +202,7 @@ def test_recording_page_names_its_echo(recording_page):
     text = recording_page.read_text()
     resolution = PRESETS["radarize"].range_resolution
     assert re.search(rf"Echoes: {40 * resolution:.2f} m \(0 dB\)", text)
-    assert "lost chirps a frame" in text and "True trajectory" in text
+    assert "lost chirps per frame" in text and "True trajectory" in text
     assert "chirps lost (12)" in text
 
 
@@ -233,7 +233,7 @@ def test_left_is_drawn_left():
     x, y = corners[np.argmax(mesh.get_array().ravel())]
     assert x == pytest.approx(-2 * np.sin(np.radians(40)), abs=0.1)
     assert y == pytest.approx(2 * np.cos(np.radians(40)), abs=0.1)
-    # Moving left: what is left comes closer; the ridge rises towards the left edge, which is positive azimuth.
+    # While moving left, surfaces on the left close in: the ridge rises to the left edge, which is positive azimuth.
     speeds = np.linspace(-1, 1, 21)
     draw_doppler(axes[0, 1], np.ones((21, 121)), speeds, azimuths, "doppler", np.array([0.0, 0.5]))
     line = axes[0, 1].lines[0]

@@ -1,4 +1,4 @@
-"""What `radarize evaluate` prints, in a terminal of 80 columns."""
+"""Output of `radarize evaluate` in a terminal of 80 columns."""
 
 import json
 
@@ -7,12 +7,12 @@ import pytest
 from radarize import cli
 from radarize.io.console import run
 from tests.evaluation.fake_run import write_run
-from tests.evaluation.report.test_report import BLIND, listing, tell
+from tests.evaluation.report.test_report import SPANS, listing, with_facts
 
 
 @pytest.fixture
 def evaluate(monkeypatch, capsys):
-    """Output of the command in words."""
+    """Run the command and return its output."""
     monkeypatch.setenv("COLUMNS", "80")
 
     def call(*arguments: object) -> str:
@@ -29,16 +29,16 @@ def test_it_prints_what_it_writes(tmp_path, evaluate):
     out = evaluate(folder)
     metrics = json.loads((folder / "metrics.json").read_text())
     assert f"{metrics['slam']['ate']['position']['mean']:.3f} m" in out
-    assert f"{100 * metrics['map']['f1']:.3g} %" in out and "blind" not in out
+    assert f"{100 * metrics['map']['f1']:.3g} %" in out and "observable" not in out
     assert max(map(len, out.splitlines())) <= 80
     assert json.loads(evaluate(folder, "--json")) == metrics
 
 
 def test_runs_beside_each_other(tmp_path, evaluate):
-    """Methods' names are whole, and nothing is written but the first run's metrics."""
+    """Names of methods are complete, and only the metrics of the first run are written."""
     names = ("scan-matching", "fused", "[b]mine[/b]")
     runs = [
-        tell(write_run(tmp_path / str(k), seed=k), methods={"odometry": name, "scans": "segmentation"})
+        with_facts(write_run(tmp_path / str(k), seed=k), methods={"odometry": name, "scans": "segmentation"})
         for k, name in enumerate(names)
     ]
     before = listing(*runs)
@@ -50,9 +50,9 @@ def test_runs_beside_each_other(tmp_path, evaluate):
     assert set(after) - set(before) == {str(runs[0] / "metrics.json")}
 
 
-def test_where_odometry_was_blind(tmp_path, evaluate):
-    folder = tell(write_run(tmp_path / "run"), blind=BLIND)
+def test_spans_with_unobservable_motion(tmp_path, evaluate):
+    folder = with_facts(write_run(tmp_path / "run"), **{"blind": SPANS})
     out = evaluate(folder)
-    assert "over 2.2 m, 12 % of the way" in " ".join(out.split())
-    assert "no match believed" in out and "no <velocity>" in out
-    assert json.loads((folder / "metrics.json").read_text())["blind"] == BLIND
+    assert "on 2.2 m, 12 % of the path" in " ".join(out.split())
+    assert "no turn" in out and "no <velocity>" in out
+    assert json.loads((folder / "metrics.json").read_text())["blind"] == SPANS

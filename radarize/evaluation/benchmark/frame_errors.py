@@ -1,4 +1,4 @@
-"""Odometry frame by frame: velocities and turns of a run beside the truth, and what it claims to know of them."""
+"""Velocities and yaws of a run's odometry with their covariances and the truth, frame by frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -17,13 +17,15 @@ from radarize.pipeline.runfolder import RunFolder
 
 @dataclass(frozen=True)
 class FrameErrors:
-    """One recording by one method.
+    """Estimates of one method of odometry on one recording, with the truth.
 
     Attributes:
-        velocity, true_velocity: m/s, sensor frame; covariance: claimed, m^2/s^2.
-        poses: by odometry; true_yaw: rad.
-        errors: of their steps.
-        period: s, from frame to frame.
+        velocity, true_velocity: in the sensor frame (forward, left), m/s.
+        covariance: estimated covariance of `velocity`, m^2/s^2.
+        poses: poses by odometry, x, y (m), yaw (rad).
+        true_yaw: rad.
+        errors: error model of the relative motions between poses.
+        period: time between frames, s.
     """
 
     velocity: Float[np.ndarray, "frame 2"]
@@ -36,7 +38,7 @@ class FrameErrors:
 
     @classmethod
     def read(cls, run: Path) -> "FrameErrors":
-        """From a run's folder.
+        """Read the estimates and the truth from the folder of a run.
 
         Raises:
             InputError: a damaged file.
@@ -54,33 +56,35 @@ class FrameErrors:
             float(np.median(np.diff(times))),
         )
 
-    def turned(self, seconds: float) -> tuple[Float[np.ndarray, "window"], Float[np.ndarray, "window"]]:
-        """Errors of the yaw over all windows of a span (one frame at least), rad, and their claimed variance, rad^2."""
+    def yaw_errors(self, seconds: float) -> tuple[Float[np.ndarray, "window"], Float[np.ndarray, "window"]]:
+        """Return errors of the change of yaw over all windows of a length in s (at least one frame), rad, and their
+        estimated variances, rad^2."""
         window = max(round(seconds / self.period), 1)
         turns = wrap(np.diff(self.poses[:, 2], prepend=0.0))
         return turn_errors(turns, self.true_yaw, window), self.errors.turns(window)
 
 
 def true_poses(run: RunFolder) -> Pose:
-    """True poses of a run's frames: truth has one for every frame, a run one for every frame that was not lost."""
+    """Return the true pose of each frame of a run. Frames that a recording has lost are in the truth alone."""
     assert run.odometry is not None  # whose poses are judged
     true, true_times, times = planar(run.scans["truth/pose"]), run.scans["truth/time"], run.odometry[0]
     return true if len(times) == len(true) else true[np.abs(true_times[:, None] - times).argmin(axis=0)]
 
 
 def joined(found: Sequence[FrameErrors]) -> dict[str, np.ndarray]:
-    """Frames of several recordings, one after the other, by attribute."""
+    """Concatenate the frames of several recordings, by attribute of `FrameErrors`."""
     names = [each.name for each in fields(FrameErrors) if each.name not in ("errors", "period")]
     return {name: np.concatenate([getattr(one, name) for one in found]) for name in names}
 
 
-def turned(found: Sequence[FrameErrors], seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """`FrameErrors.turned` of several recordings, one after the other."""
-    errors, claims = zip(*(one.turned(seconds) for one in found), strict=True)
-    return np.concatenate(errors), np.concatenate(claims)
+def joined_yaw_errors(found: Sequence[FrameErrors], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Concatenate `FrameErrors.yaw_errors` of several recordings."""
+    errors, variances = zip(*(one.yaw_errors(seconds) for one in found), strict=True)
+    return np.concatenate(errors), np.concatenate(variances)
 
 
-def turn_nees(found: Sequence[FrameErrors], seconds: float) -> float:
-    """Mean squared error of `turned` over its claims; NaN without any, infinite where nothing is claimed."""
-    errors, claims = map(pd.Series, turned(found, seconds))
-    return float((errors**2 / claims).mean())
+def yaw_nees(found: Sequence[FrameErrors], seconds: float) -> float:
+    """Return the mean NEES of changes of yaw over windows of a length in s; NaN without windows, infinite if a variance
+    is zero."""
+    errors, variances = map(pd.Series, joined_yaw_errors(found, seconds))
+    return float((errors**2 / variances).mean())

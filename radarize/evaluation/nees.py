@@ -1,4 +1,4 @@
-"""Whether estimates are as far from the truth as they say."""
+"""Normalised estimation error squared (NEES): whether errors agree with their estimated covariances."""
 
 import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
@@ -8,14 +8,14 @@ from radarize.evaluation.metrics import TrajectoryErrors
 from radarize.io.alignment import yaws
 from radarize.io.pose import between
 
-#: s from the start on, in which hardly anything is uncertain yet.
+#: s from the start of a trajectory, left out because poses have next to no uncertainty there.
 EARLY = 5.0
 
 
-def normalised(
+def nees(
     errors: Float[np.ndarray, "sample axis"], covariances: Float[np.ndarray, "sample axis axis"]
 ) -> Float[np.ndarray, "sample"]:
-    """Squared errors in units of their covariances, per dimension: 1 on average if these are honest.
+    """Return the NEES of each sample, divided by the number of dimensions: its mean is 1 if covariances are consistent.
 
     Raises:
         np.linalg.LinAlgError: a covariance is singular.
@@ -25,26 +25,26 @@ def normalised(
 
 
 def pose_nees(
-    errors: TrajectoryErrors, times: Float[np.ndarray, "pose"], covariances: Float[np.ndarray, "claim 3 3"]
+    errors: TrajectoryErrors, times: Float[np.ndarray, "pose"], covariances: Float[np.ndarray, "covariance 3 3"]
 ) -> float:
-    """Mean squared error of the way since the start in units of its covariance, per dimension: 1 if claims are honest.
+    """Return the mean NEES per dimension of the motion since the first pose: 1 if its covariances are consistent.
 
     Args:
-        errors: of the trajectory.
-        times: of all its poses, s.
-        covariances: of each pose, (x, y, yaw) in its own frame, given the first.
+        errors: errors of the trajectory.
+        times: time stamps of all of its poses, s.
+        covariances: covariance of (x, y, yaw) of each pose, in the frame of that pose, given the first pose.
 
     Returns:
-        NaN where nothing lies more than `EARLY` after the start, or where there is no covariance.
+        NaN if no pose is more than `EARLY` after the start, or if a covariance is missing or singular.
     """
     late = errors.time > times[0] + EARLY
     if not late.any() or len(covariances) != len(times):
         return float("nan")
-    claimed = covariances[np.searchsorted(times, errors.time[late])]
-    if not (np.isfinite(claimed).all() and (np.linalg.det(claimed) > 0).all()):
+    estimated = covariances[np.searchsorted(times, errors.time[late])]
+    if not (np.isfinite(estimated).all() and (np.linalg.det(estimated) > 0).all()):
         return float("nan")
     estimate, truth = (_since_start(some)[late] for some in (errors.estimate, errors.reference))
-    return float(normalised(between(truth, estimate), claimed).mean())
+    return float(nees(between(truth, estimate), estimated).mean())
 
 
 def _since_start(poses: PoseTrajectory3D) -> Float[np.ndarray, "pose 3"]:

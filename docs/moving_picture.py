@@ -146,7 +146,7 @@ def draw_view(axis: Axes, picture: np.ndarray, view: View, scenario: Scenario, t
     """The rendering with the rays of a frame and the radar's way so far."""
     axis.imshow(picture, extent=(0, view.width, view.height, 0), interpolation="none")
     way = view(scenario.motion.position(np.arange(0, time + 0.05, 0.1)))
-    axis.plot(*way.T, ":", color="k", lw=1.6, label="true trajectory")
+    axis.plot(*way.T, color="0.15", lw=1.2, label="path of the radar")
     found = rays(scenario, time)
     for name, color, width, style in (("direct", DIRECT, 0.9, "-"), ("ghost", GHOST, 1.5, (0, (4, 1.2)))):
         lines = LineCollection(list(view(found[name])), colors=color, linewidths=width, linestyles=[style])

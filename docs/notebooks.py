@@ -12,21 +12,21 @@ from pathlib import Path
 
 import nbformat
 from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
+from nbclient.exceptions import CellExecutionError, CellTimeoutError
 from traitlets.config import Config
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 RESULTS = ROOT / "build" / "notebooks"
 #: Of a cell, s.
-TIMEOUT = 600
+TIMEOUT = 1800
 
 
 def run(notebook: Path) -> float:
     """Run a notebook in an empty folder of its own, keep it with its outputs, and return the seconds that it took.
 
     Raises:
-        CellExecutionError: a cell failed.
+        CellExecutionError, CellTimeoutError: a cell failed, or did not end.
     """
     pages = nbformat.read(notebook, as_version=4)
     start = time.perf_counter()
@@ -56,7 +56,7 @@ def main() -> int:
     for path in chosen:
         try:
             print(f"{path.relative_to(ROOT)}: {run(path):.0f} s", flush=True)
-        except CellExecutionError as error:
+        except (CellExecutionError, CellTimeoutError) as error:
             failed += 1
             print(f"{path.relative_to(ROOT)}: a cell failed\n{error}", file=sys.stderr, flush=True)
     return 1 if failed else 0

@@ -1,5 +1,5 @@
-"""Lays out the pages for mkdocs in `build/pages`: as in the repository, so that links between them hold, with README as
-the start page, notebooks with their outputs, and a reference of commands from their own help.
+"""Lays out the pages for mkdocs in `build/pages`: as in the repository, so that links lead where they lead there, with
+README as the start page and the reference of commands, generated from the command lines.
 """
 
 import re

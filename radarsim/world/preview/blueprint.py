@@ -22,7 +22,7 @@ STYLES: dict[str, tuple[str, str]] = {
     "fabric": ("#2b4fb0", "..."),
     "floorboard": ("#d9a566", "||"),
     "glass": ("#25b4e6", ""),
-    "marble": ("#c9a8e0", "xx"),
+    "marble": ("#e0cdec", ""),
     "metal": ("#0f7f6b", ""),
     "plasterboard": ("#d08c8c", ""),
     "plywood": ("#d99c4a", ""),

@@ -1,5 +1,7 @@
-"""Radar odometry. ``radarize.odometry(recording)`` estimates it, see `radarize.estimate_odometry`; the modules here are
-what it is made of.
+"""Radar odometry. Call it as ``radarize.odometry(recording)``, see `radarize.estimate_odometry`.
+
+`integration.Odometry` is the algorithm. It takes velocities from `doppler`, `learned` or `fused`, and yaw increments
+from `rotation` or `learned`; `uncertainty` is its error model.
 """
 
 import sys
@@ -8,10 +10,11 @@ from typing import Any
 
 
 class _Odometry(ModuleType):
-    """The package, which is called as the function of the same name: importing a module of it would hide that."""
+    """A callable package. Importing one of its modules replaces the function `radarize.odometry` by this package, so
+    the package forwards calls to that function."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """See `radarize.estimate_odometry`."""
+        """Estimate odometry, see `radarize.estimate_odometry`."""
         import radarize
 
         return radarize.estimate_odometry(*arguments, **options)

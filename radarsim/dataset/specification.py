@@ -14,7 +14,7 @@
     radar: radarize                    # preset or .cfg file
     frontend: board.yaml               # as `radarsim calibrate` writes it; the board's own by default
     sensors: [depth, imu]              # or all, or none
-    storage: raw                       # or heatmaps: no samples, about a tenth of the size, for training
+    storage: raw                       # or heatmaps: no samples, 37 % of the size, for training
     variants:                          # every recording once for each, with the same seed and walk
       plain: {}
       coarse: {radar: {samples: 48}, attributes: {value: 48}}             # see `radarsim.dataset.variant`

@@ -125,13 +125,13 @@ class RotationConfig(Frozen):
     fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of the yaw rate before any measurement", gt=0)
     yaw_noise: float = setting(np.radians(0.3), "rad, standard deviation of a match with correlation 1", gt=0)
     guided_yaw_noise: float = setting(
-        np.radians(1.6), "rad, the same if a network estimates rotation too; larger because a map that lags in a turn "
-        "makes the errors of many matches correlated", gt=0
+        np.radians(2.4), "rad, the same if a network estimates rotation too; larger because a map that lags in a turn "
+        "makes the errors of many matches correlated; chosen together with `doubt`", gt=0
     )  # fmt: skip
     doubt: float = setting(
-        4.0, "factor on the variance that the network estimates for a yaw increment; chosen together with the noise "
-        "above and the weight of bearings on 15 walks: the mean error of the heading is 0.9 deg instead of 3.0 deg",
-        ge=1
+        2.0, "factor on the variance that the network estimates for a yaw increment; chosen on four handheld walks of "
+        "60 s in furnished rooms (A to D of seeds 301 to 304), where the error of the heading over 10 s is 4.0 deg and "
+        "hardly depends on it", ge=1
     )  # fmt: skip
     least_correlation: float = setting(0.15, "minimum correlation of an accepted match", ge=0, lt=1)
     right_angles: bool = setting(

@@ -1,5 +1,5 @@
-"""All that somebody may want to set of the pipeline, in one place: ``radarize config`` prints it, and ``radarize run
---config mine.yaml`` takes it."""
+"""All settings of the pipeline in one place: ``radarize config`` prints them, ``radarize run --config mine.yaml`` reads
+them."""
 
 import json
 from collections.abc import Iterator
@@ -20,20 +20,22 @@ from radarize.slam.config import SlamConfig
 
 
 class Configuration(Frozen):
-    """The pipeline's settings; each section belongs to one step, and is described where that step stands."""
+    """Settings of the pipeline, one section per step; the class of each section describes its fields."""
 
     heatmaps: HeatmapConfig = setting(HeatmapConfig(), "spectra and beamformers of the classical methods")
-    scans: ScanConfig = setting(ScanConfig(), "echoes in range-azimuth maps, of scans without networks")
-    doppler: DopplerConfig = setting(DopplerConfig(), "velocity from single echoes")
-    rotation: RotationConfig = setting(RotationConfig(), "turns by matching frames with a local map")
-    velocity: VelocityConfig = setting(VelocityConfig(), "filter of velocities, whoever tells them")
-    fusion: FusionConfig = setting(FusionConfig(), "velocities by network and Doppler together")
-    turns: TurnConfig = setting(TurnConfig(), "turns by the network")
-    slam: SlamConfig = setting(SlamConfig.preset("radar"), "the back end")
+    scans: ScanConfig = setting(ScanConfig(), "echoes in range-azimuth maps, for scans without networks")
+    doppler: DopplerConfig = setting(
+        DopplerConfig(), "velocity from the Doppler speeds and directions of single echoes"
+    )
+    rotation: RotationConfig = setting(RotationConfig(), "rotation by matching frames with a local map")
+    velocity: VelocityConfig = setting(VelocityConfig(), "filter of the velocities of any estimator")
+    fusion: FusionConfig = setting(FusionConfig(), "fusion of velocities from the network and from Doppler")
+    turns: TurnConfig = setting(TurnConfig(), "rotation by the network")
+    slam: SlamConfig = setting(SlamConfig.preset("radar"), "SLAM back end")
 
     @classmethod
     def load(cls, path: str | Path) -> "Configuration":
-        """The defaults with what a YAML file says otherwise: sections and fields named as here.
+        """Read settings from a YAML file, with sections and fields named as here; what is missing has its default.
 
         Raises:
             InputError: no such file, or a field that does not exist or has an impossible value.
@@ -41,7 +43,7 @@ class Configuration(Frozen):
         return read_settings(path, cls(), "sections as `radarize config` prints")
 
     def text(self) -> str:
-        """As YAML, with what each field means beside it."""
+        """Return the settings as YAML, with the description of each field as a comment."""
         return "\n".join(_lines(self, "")) + "\n"
 
 

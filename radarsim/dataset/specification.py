@@ -1,4 +1,4 @@
-"""What a data set holds: a YAML file, and the list of recordings it stands for.
+"""Specification of a data set: a YAML file that expands to a list of recordings.
 
     name: two-floors
     seed: 1
@@ -25,10 +25,10 @@
       platform: {kind: platform, train: [handheld]}                     # tested on all others
       building: {kind: building, held_out: [A, shop]}                   # building-A, building-shop
 
-A recording is called BUILDING_FLOOR_PLATFORM_NUMBER, and _VARIANT where there are some. Its seed comes from the data
-set's seed and the name without the variant alone, so a recording stays the same whatever else the data set holds and in
-whatever order it is made. Recordings can go through `waypoints` ([[x, y], ...], m) instead of on a tour. `attributes`,
-of the data set, of recordings or of a variant, become attributes of the files.
+A recording is named BUILDING_FLOOR_PLATFORM_NUMBER, plus _VARIANT if there are variants. Its seed depends only on the
+data set's seed and its name without the variant, so a recording stays the same whatever else the data set contains.
+Recordings can follow `waypoints` ([[x, y], ...], m) instead of a tour. `attributes`, of the data set, of recordings or
+of a variant, become attributes of the files.
 """
 
 import fnmatch
@@ -56,27 +56,27 @@ from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import described, description_model, find, shipped, split_level
 from radarsim.world.validation import format_validation_error
 
-#: What a building here may say of itself that stands beside `building` in a scene file.
+#: Keys of a building that are top-level keys in a scene file, beside `building`.
 OF_SCENE = "clutter", "unevenness", "furniture", "materials", "interferers"
-#: Recordings that a data set may stand for: a count with a digit too many takes all memory.
+#: Largest number of recordings of a data set: a mistyped count must not exhaust the memory.
 MOST = 20_000
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
 
 class Recordings(Frozen):
-    """Some recordings of one building.
+    """A group of recordings in one building.
 
     Attributes:
-        building: a name of `Specification.buildings`, or a pattern that some of them match (`fnmatch`).
-        floors: used in turn; none for buildings without floors.
-        platform: one, or several with `count` recordings each.
-        count: recordings per platform.
-        duration: s, each.
-        waypoints: to go through instead of a tour, m.
-        people: pedestrians near the radar's path in each.
-        variants: some of `Specification.variants`; all if none is named.
-        by_turns: one of the variants for each building that matches, in turn, instead of all of them.
-        attributes: of the recordings.
+        building: a name in `Specification.buildings`, or a pattern that matches some of them (`fnmatch`).
+        floors: floors, used in turn; empty for buildings without floors.
+        platform: one platform, or several with `count` recordings each.
+        count: number of recordings per platform.
+        duration: duration of each, s.
+        waypoints: way-points instead of a tour, m.
+        people: number of pedestrians near the radar's path in each.
+        variants: names in `Specification.variants`; empty: all of them.
+        by_turns: use one variant per matching building, in turn, instead of all variants.
+        attributes: attributes of the recordings.
     """
 
     building: Annotated[str, Field(pattern=r"^[A-Za-z0-9*?!\[\]-]+$")]
@@ -95,7 +95,7 @@ class Recordings(Frozen):
         return (self.platform,) if isinstance(self.platform, str) else self.platform
 
     def each(self, count: Counter) -> Iterator[tuple[str, str, int | None]]:
-        """Name, platform and floor of each recording; `count` says how many there are by place and platform."""
+        """Name, platform and floor of each recording; `count` counts the recordings by place and platform."""
         for platform in self.platforms:
             for k in range(self.count):
                 floor = self.floors[k % len(self.floors)] if self.floors else None
@@ -105,7 +105,7 @@ class Recordings(Frozen):
 
 
 class Specification(Frozen):
-    """A data set's specification; see the head of this file."""
+    """Specification of a data set; the module's docstring shows an example."""
 
     name: Name
     seed: int = Field(0, ge=0)
@@ -124,7 +124,7 @@ class Specification(Frozen):
     @field_validator("buildings", mode="before")
     @classmethod
     def _each_seed(cls, given: object) -> object:
-        """Buildings with `seeds`, first and last, as so many buildings."""
+        """Expand a building with `seeds`, first and last, to one building per seed."""
         if not isinstance(given, dict):
             return given
         found: dict[str, object] = {}
@@ -143,7 +143,7 @@ class Specification(Frozen):
 
     @model_validator(mode="after")
     def _each_building(self) -> "Specification":
-        """Recordings of a pattern as those of each building that matches."""
+        """Expand recordings with a pattern to those of each matching building."""
         groups: list[Recordings] = []
         for group in self.recordings:
             names = (
@@ -178,7 +178,7 @@ class Specification(Frozen):
 
     @classmethod
     def load(cls, path: str | Path) -> "Specification":
-        """Read a specification: a YAML file, or the name of one that comes with the project (``small``).
+        """Read a specification: a YAML file, or the name of one of the project (``small``).
 
         Raises:
             InputError: missing file, malformed YAML, an unknown key or a wrong value, with file and field.
@@ -190,7 +190,7 @@ class Specification(Frozen):
         try:
             found = cls.model_validate(data)
             found._folder = path.parent
-            for late in ("tasks", "members"):  # so that their errors come now, with the file's name
+            for late in ("tasks", "members"):  # compute them now, so that their errors name the file
                 getattr(found, late)
         except ValidationError as error:
             raise InputError(f"{path}: {format_validation_error(error, data)}") from error
@@ -249,7 +249,7 @@ class Specification(Frozen):
 
     @cached_property
     def members(self) -> dict[str, dict[str, list[str]]]:
-        """Split name to train, validation and test to names of recordings."""
+        """Names of the training, validation and test recordings of each split."""
         found: dict[str, dict[str, list[str]]] = {}
         for name, split in self.splits.items():
             rng = np.random.default_rng([self.seed, *name.encode()])
@@ -268,7 +268,7 @@ class Specification(Frozen):
         }
 
     def _settings(self, key: str, variant: Variant, radar: str, frontend: str | None) -> tuple[RadarConfig, str]:
-        """A variant's radar, and a digest of it and the front end."""
+        """Radar configuration of a variant, and a digest of it and its front end."""
         try:
             config, _ = load_config(variant.radar_of(radar))
             check_limits(config)
@@ -285,7 +285,7 @@ class Specification(Frozen):
         return tuple(chosen(["all"] if self.sensors == "all" else self.sensors))
 
     def _scene(self, building: str, floor: int | None, level: int) -> tuple[dict | str, set[str]]:
-        """A scene, and what is not drawn for recordings in it."""
+        """Scene of a recording, and the fields that are not drawn in it."""
         given = self.buildings[building]
         if isinstance(given, str):
             try:
@@ -309,7 +309,7 @@ class Specification(Frozen):
         return description, set(given)
 
     def _beside(self, name: str) -> str:
-        """A file that the specification names: beside it where there is one, else left to those who look further."""
+        """Path of a file that the specification names: beside it if it exists there, else as it is."""
         beside = self._folder / name
         found = next((path for path in (beside, Path(name)) if path.is_file()), None)
         return name if found is None else str(within(found, "it", self._folder, Path("scenes"), shipped()).resolve())

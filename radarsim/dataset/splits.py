@@ -1,4 +1,4 @@
-"""Which recordings train, validate and test: at random, by platform, or with a building held out (paper, section 7)."""
+"""Splits into training, validation and test recordings: random, by platform, or by building (paper, section 7)."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -15,7 +15,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class RandomSplit(Frozen):
-    """Drawn anew for each of `folds` splits, called NAME-0, NAME-1, ..."""
+    """Random split, drawn independently for each of `folds` splits NAME-0, NAME-1, ..."""
 
     kind: Literal["random"]
     folds: int = Field(5, gt=0, le=100)
@@ -30,7 +30,7 @@ class RandomSplit(Frozen):
         return self
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
-        """Split name to its parts."""
+        """Parts of each split by its name."""
         ends = np.round(np.cumsum([self.train, self.validation]) * len(tasks)).astype(int)
         found = {}
         for fold in range(self.folds):
@@ -43,18 +43,18 @@ class RandomSplit(Frozen):
 
 
 class PlatformSplit(Frozen):
-    """Trained on some platforms, tested on others (all others by default)."""
+    """Train on some platforms, test on others (default: all others)."""
 
     kind: Literal["platform"]
     train: tuple[str, ...] = Field(min_length=1)
     test: tuple[str, ...] | None = None
-    validation: Share = 0.1  # of what would train
+    validation: Share = 0.1  # fraction of the training recordings
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
-        """Split name to its parts.
+        """Parts of each split by its name.
 
         Raises:
-            InputError: a platform that no recording has, or one on both sides.
+            InputError: a platform without recordings, or one in both parts.
         """
         present = sorted({task.platform for task in tasks})
         tested = tuple(p for p in present if p not in self.train) if self.test is None else self.test
@@ -71,13 +71,13 @@ class BuildingSplit(Frozen):
 
     kind: Literal["building"]
     held_out: tuple[str, ...] | None = None  # every building if absent
-    validation: Share = 0.1  # of what would train
+    validation: Share = 0.1  # fraction of the training recordings
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
-        """Split name to its parts.
+        """Parts of each split by its name.
 
         Raises:
-            InputError: a building that no recording has, or none that is left to train on.
+            InputError: a building without recordings, or no building left to train on.
         """
         present = sorted({task.building for task in tasks})
         _require_known("held_out", self.held_out or (), present)

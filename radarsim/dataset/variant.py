@@ -1,4 +1,4 @@
-"""What differs between recordings that have everything else in common: scatterers, noise and the walk included."""
+"""Variants of a recording: changes of radar, front end or scene level with the same walk, scatterers and noise."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -17,14 +17,14 @@ Attributes = dict[str, str | float | int | bool]
 
 
 class Variant(Frozen):
-    """Changes against what the specification says.
+    """Changes against the specification.
 
     Attributes:
-        level: of a scene that has levels (`radarsim.world.description`); the walk is planned in its level 0.
-        radar: fields of `RadarConfig` to change, or a preset in place of the radar.
-        frontend: fields of `FrontEndConfig` to change; of its parts, those given.
+        level: level of a scene that has levels (`radarsim.world.description`); the walk is planned at level 0.
+        radar: fields of `RadarConfig` to change, or a preset that replaces the radar.
+        frontend: fields of `FrontEndConfig` to change; nested ones are merged.
         mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
-        attributes: of the recordings.
+        attributes: attributes of the recordings.
     """
 
     level: int = Field(0, ge=0)
@@ -44,10 +44,10 @@ class Variant(Frozen):
         return fields
 
     def with_board(self, beside: Callable[[str], str]) -> "Variant":
-        """The same, with what a board's file holds in place of its name, which `beside` turns into a path.
+        """Return the variant with the name of a board replaced by the contents of its file, whose path `beside` gives.
 
         Raises:
-            InputError: there is no such file, or it cannot be used.
+            InputError: the file does not exist or cannot be used.
         """
         radar = self.radar if isinstance(self.radar, dict) else {}
         board = radar.get("board")
@@ -56,17 +56,17 @@ class Variant(Frozen):
         return self.model_copy(update={"radar": {**radar, "board": load_board(beside(board))}})
 
     def radar_of(self, name: str) -> str | RadarConfig:
-        """The radar of that name (preset or file) with the changes; the name itself where there are none.
+        """Return the radar of that name (preset or file) with the changes; the name itself if there are none.
 
         Raises:
-            InputError: no such preset or file, or an impossible value.
+            InputError: unknown preset, missing file, or impossible value.
         """
         if isinstance(self.radar, str):
             return self.radar
         return load_config(name)[0].changed("radar", **self.radar) if self.radar else name
 
     def frontend_of(self, file: str | None, board: str | Board) -> FrontEndConfig:
-        """The front end of that file, by default the board's, with the changes.
+        """Return the front end of a file, or the board's, with the changes.
 
         Raises:
             InputError: unreadable file, or an unknown or impossible value.
@@ -76,5 +76,5 @@ class Variant(Frozen):
 
     @property
     def mounted(self) -> Mounting | None:
-        """The sensor's mounting; None: the platform's own."""
+        """Mounting of the sensor; None: the platform's own."""
         return Mounting.of(self.mounting[:3], self.mounting[3:]) if self.mounting else None

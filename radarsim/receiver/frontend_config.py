@@ -1,6 +1,6 @@
-"""Settings of the front end. Each board's file has its own (`radarize.radar.boards`); a front-end file changes some.
+"""Settings of the front end. Each board's file has its own (`radarize.radar.boards`); a front-end file overrides some.
 
-Every effect can be switched off by itself (`null`, `false`), and `FrontEndConfig.ideal()` has none.
+Every effect can be switched off (`null`, `false`); `FrontEndConfig.ideal()` has none.
 """
 
 from collections.abc import Sequence
@@ -25,19 +25,19 @@ class _Strict(BaseModel):
 
 
 class Channel(_Strict):
-    """A complex value of one (tx, rx) channel."""
+    """Complex gain of one (tx, rx) channel."""
 
     gain_db: float
     phase_deg: float
 
     @property
     def factor(self) -> complex:
-        """As a complex amplitude."""
+        """Complex amplitude of the channel."""
         return 10 ** (self.gain_db / 20) * np.exp(1j * np.deg2rad(self.phase_deg))
 
     @classmethod
     def of(cls, factor: complex) -> "Channel":
-        """From a complex amplitude, rounded to what a reader wants to see."""
+        """Convert a complex amplitude, rounded for readers."""
         return cls(
             gain_db=round(20 * np.log10(max(abs(factor), 1e-20)), 3), phase_deg=round(np.rad2deg(np.angle(factor)), 2)
         )
@@ -47,10 +47,10 @@ class _PerChannel(_Strict):
     channels: tuple[Channel, ...] | None = None
 
     def measured(self, board: Board, source: str = "front end") -> Complex[np.ndarray, "tx rx"]:
-        """`channels` as complex amplitudes; `source` is what errors name as their origin.
+        """`channels` as complex amplitudes; `source` names their origin in error messages.
 
         Raises:
-            InputError: they are not as many as the board's.
+            InputError: their number differs from the board's.
         """
         tx, rx = len(board.tx), len(board.rx)
         channels = self.channels or ()
@@ -65,8 +65,8 @@ class _PerChannel(_Strict):
 class Mismatch(_PerChannel):
     """Gain and phase errors of the channels.
 
-    A channel's factor is its transmitter's times its receiver's, each drawn from the seed within half the bounds, as
-    the errors of a real board are: all echoes of a TX share its error.
+    A channel's factor is the product of its transmitter's and its receiver's, each drawn from the seed within half the
+    bounds, as on a real board: all channels of a TX share its error.
 
     Attributes:
         gain_db, phase_deg: bounds of a channel's error (data sheet SWRS228: 0.5 dB and 3 deg over temperature).
@@ -78,9 +78,10 @@ class Mismatch(_PerChannel):
 
 
 class Leakage(_PerChannel):
-    """What goes from TX to RX on the board: one static echo from almost no range.
+    """Leakage from TX to RX on the board: one static echo at nearly zero range.
 
-    The default lies within what `radarsim calibrate` finds in three public captures of two boards: -42, -47 and -49 dB
+    The default lies within the results of `radarsim calibrate` on three public captures of two boards: -42, -47 and -49
+        dB
     at 0.42, 0.36 and 0.69 ns.
 
     Attributes:
@@ -94,10 +95,11 @@ class Leakage(_PerChannel):
 
 
 class MountEcho(_PerChannel):
-    """A static echo of the radar's own housing, radome or mount, which moves with it.
+    """Static echo of the radar's own housing, radome or mount.
 
-    Several edges add up in it: `radarsim calibrate` finds no plane wave in the echoes of public captures, and levels of
-    the channels that spread as those of independent complex normal amplitudes.
+    It is a sum over several edges: in the echoes of public captures `radarsim calibrate` finds no plane wave, and
+        channel
+    levels that spread like those of independent complex normal amplitudes.
 
     Attributes:
         distance: m.
@@ -110,7 +112,7 @@ class MountEcho(_PerChannel):
 
     @property
     def delay(self) -> float:
-        """Out and back, s."""
+        """Round-trip delay, s."""
         return 2 * self.distance / SPEED_OF_LIGHT
 
 
@@ -135,11 +137,11 @@ class PhaseNoise(_Strict):
 
 
 class Band(_Strict):
-    """The decimation filter's amplitude response over the beat frequency, as fractions of the sample rate.
+    """Amplitude response of the decimation filter over the beat frequency, as fractions of the sample rate.
 
-    0 at `low`, 1 from 0 to `flat`, 0 from `high` on, straight in between. Noise of real captures falls by 2 to 9 dB in
-    the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. Where it
-    closes is as far as the simulator looks for echoes: they fade out there, and none pops.
+    0 at `low`, 1 from 0 to `flat`, 0 from `high` on, linear in between. Noise of real captures falls by 2 to 9 dB in
+    the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. The
+    simulator finds echoes up to the closed end of the band, where they fade out smoothly.
     """
 
     low: float = Field(-0.06, lt=0)
@@ -157,13 +159,13 @@ class Band(_Strict):
         return np.interp(x, [self.low, 0.0, self.flat, self.high], [0.0, 1.0, 1.0, 0.0])
 
     def noise(self, x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-        """Power of white noise that is sampled behind the filter, over what it is before: all aliases add up."""
+        """Power of white noise sampled after the filter, relative to its power before: the sum over all aliases."""
         aliases = np.arange(np.floor(self.low) - 1, np.ceil(self.high) + 1)
         return np.sum(self.response(np.add.outer(aliases, x)) ** 2, axis=0)
 
 
 class FrontEndConfig(_Strict):
-    """Everything between the field at the antennas and the samples in the file.
+    """Settings of everything between the field at the antennas and the samples in the file.
 
     Attributes:
         antenna: pattern of each element; null: isotropic.
@@ -177,10 +179,10 @@ class FrontEndConfig(_Strict):
         adc_bits: resolution. 16: all bits of the file carry signal, as in real captures, where the decimation filter
             has averaged a faster converter. 12: steps of 16 counts.
         leakage, mismatch, phase_noise: null: none.
-        mount: static echoes of the radar's own housing and mount; null: none. The default is the middle of what
-            `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
+        mount: static echoes of the radar's own housing and mount; null: none. The default is the middle of the results
+            of `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
             at 0.14, 0.13 and 0.25 m, one in each.
-        if_bandwidth_hz: of the IF amplifier, as far as the receiver hears where no decimation filter closes before.
+        if_bandwidth_hz: of the IF amplifier; limits the range where no decimation filter does.
         high_pass: the two first-order stages of the radar configuration.
         band: null: flat up to `if_bandwidth_hz` (echoes beyond the maximum range fold).
         image_rejection_db: of the I/Q mixer (data sheet: 30 dB); null: perfect. The image of beat frequency f is at
@@ -204,10 +206,10 @@ class FrontEndConfig(_Strict):
 
     @classmethod
     def of(cls, board: str | Board, **changes: object) -> "FrontEndConfig":
-        """The front end in a board's file, with changes; of its parts (`leakage={"delay": 1e-9}`), those given.
+        """Return the front end of a board's file with changes; nested settings (`leakage={"delay": 1e-9}`) are merged.
 
         Raises:
-            InputError: unknown or impossible value, in the file or the changes; with the field.
+            InputError: unknown or impossible value, in the file or the changes, with the field's name.
         """
         board = load_board(board)
         settings = cls.build(f"{board.name}.yaml: front_end", board.front_end)
@@ -215,7 +217,7 @@ class FrontEndConfig(_Strict):
 
     @classmethod
     def ideal(cls, board: str | Board = "iwr1843boost", **changes: object) -> "FrontEndConfig":
-        """Nothing but a board's power and a 16-bit converter, with `changes`."""
+        """Front end with a board's power and a 16-bit converter only, with `changes`."""
         off = {"noise": False, "leakage": None, "mount": None, "mismatch": None, "phase_noise": None}
         return cls.of(
             board, **{"high_pass": False, "antenna": None, "band": None, "image_rejection_db": None, **off, **changes}
@@ -223,11 +225,11 @@ class FrontEndConfig(_Strict):
 
     @property
     def pattern(self) -> Antenna:
-        """The antenna pattern, isotropic where it is switched off."""
+        """Antenna pattern, isotropic if it is switched off."""
         return self.antenna or ISOTROPIC
 
     def noise_factor(self, gain_db: float) -> float:
-        """Noise factor (linear) at a receive gain, dB; never below 1."""
+        """Noise factor (linear) at a receive gain in dB; at least 1."""
         gains = np.array(list(self.noise_figure_db))
         factors = 10 ** (np.array(list(self.noise_figure_db.values())) / 10)
         line = np.polyfit(10 ** (-gains / 10), factors, min(1, len(gains) - 1))
@@ -235,10 +237,10 @@ class FrontEndConfig(_Strict):
 
     @classmethod
     def load(cls, path: str | Path, board: str | Board) -> "FrontEndConfig":
-        """Read a front-end file; what it does not name is the board's.
+        """Read a front-end file; missing settings are the board's.
 
         Raises:
-            InputError: unreadable, malformed YAML, unknown or impossible value; with file and field.
+            InputError: unreadable, malformed YAML, unknown or impossible value, with file and field.
         """
         data = read_yaml(path)
         if not isinstance(data, dict | None):
@@ -251,10 +253,10 @@ class FrontEndConfig(_Strict):
 
     @classmethod
     def build(cls, source: str, fields: dict[str, object]) -> "FrontEndConfig":
-        """Settings from their fields; `source` is what errors name as their origin.
+        """Build settings from fields; `source` names their origin in error messages.
 
         Raises:
-            InputError: unknown or impossible value; with the field.
+            InputError: unknown or impossible value, with the field's name.
         """
         try:
             return cls.model_validate(fields)
@@ -262,7 +264,7 @@ class FrontEndConfig(_Strict):
             raise InputError(f"{source}: {format_validation_error(error, fields)}") from error
 
     def save(self, path: Path, remarks: Sequence[str] = ()) -> None:
-        """Write as a front-end file, with remarks as comments on top."""
+        """Write a front-end file, with remarks as comments on top."""
         text = "".join(f"# {remark}\n" for remark in remarks) + yaml.safe_dump(
             self.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120
         )

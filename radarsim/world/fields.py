@@ -1,4 +1,4 @@
-"""What the fields of scene files are made of."""
+"""Field types of scene files."""
 
 from typing import Annotated
 
@@ -11,6 +11,6 @@ Vector = tuple[Number, Number, Number]
 
 
 class Strict(BaseModel):
-    """Fields that do not change, and no others."""
+    """Immutable model that rejects unknown fields."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

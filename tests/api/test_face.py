@@ -1,4 +1,4 @@
-"""`import radarize as rz`: what it offers, what that is called, and the examples of its docstrings."""
+"""`import radarize as rz`: its public names, their docstrings, and the examples in them."""
 
 import ast
 import doctest
@@ -21,19 +21,19 @@ PUBLIC["simulate"] = radarsim.simulate
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_examples(name, walk, rec, monkeypatch):
-    """Of every public function; a class may have its example where it is made."""
+    """Each public function has an example that runs; a class may have it where it is constructed."""
     monkeypatch.chdir(walk.parent)
     names = {"rz": rz, "radarsim": radarsim, "rec": rec}
     found = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=names)
     examples = [each for each in found if each.examples]
     assert examples or inspect.isclass(PUBLIC[name])
-    said: list[str] = []
+    output: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
-    assert not sum(runner.run(each, out=said.append).failed for each in examples), "".join(said)
+    assert not sum(runner.run(each, out=output.append).failed for each in examples), "".join(output)
 
 
 @pytest.mark.parametrize("name", [name for name, each in PUBLIC.items() if not inspect.isclass(each)])
-def test_docstrings_say_what_comes_out_and_what_goes_wrong(name):
+def test_docstrings_have_all_sections(name):
     text = inspect.getdoc(PUBLIC[name])
     assert all(f"\n{part}:\n" in text for part in ("Args", "Returns", "Raises", "Example"))
     signature = inspect.signature(PUBLIC[name])
@@ -45,7 +45,7 @@ def test_docstrings_say_what_comes_out_and_what_goes_wrong(name):
 
 @pytest.mark.parametrize("package", ["radarize", "radarsim"])
 def test_type_checkers_see_what_is_there(package):
-    """What is imported for them is what the module offers, from the same places."""
+    """Names imported for type checkers are those of the module, from the same modules."""
     tree = ast.parse((ROOT / package / "__init__.py").read_text())
     (shown,) = (n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")
     places = {alias.asname: (node.module, alias.name) for node in shown.body for alias in node.names}
@@ -70,7 +70,7 @@ def test_what_is_not_there_is_an_attribute_error():
 
 
 def test_odometry_stays_a_package():
-    """Whatever was imported first."""
+    """The function and the package of the name `odometry` are the same in any order of imports."""
     from radarize.odometry import uncertainty
 
     assert rz.odometry.uncertainty is uncertainty and callable(rz.odometry)

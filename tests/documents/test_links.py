@@ -1,4 +1,4 @@
-"""Links between pages lead somewhere, and the site has them all."""
+"""Links between pages have targets, and the site includes all pages."""
 
 import re
 from pathlib import Path
@@ -22,8 +22,8 @@ def test_links_lead_somewhere(page):
 
 
 def test_the_site_has_every_page():
-    """But for the reference of commands, which is written when the site is built, and the benchmarks' own pages."""
-    notebooks = {f"notebooks/{path.stem}.md" for path in (ROOT / "notebooks").glob("*.ipynb")}  # written then, too
+    """All pages except the reference of commands, which is generated with the site, and pages of benchmarks."""
+    notebooks = {f"notebooks/{path.stem}.md" for path in (ROOT / "notebooks").glob("*.ipynb")}  # written with it
     settings = yaml.safe_load((ROOT / "mkdocs.yml").read_text())
     named = set(re.findall(r"[\w/]+\.md", yaml.safe_dump(settings["nav"])))
     pages = {str(page.relative_to(ROOT)) for page in PAGES if "results" not in page.parts}

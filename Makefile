@@ -1,5 +1,6 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
 # make bounds: tests of compiled loops, which then look whether they index within bounds
+# make notebooks: runs the notebooks, and prints how long each takes; fails if a cell fails
 # make docs: builds the pages of documentation, with an environment of its own (requirements-docs.lock)
 # make results: all pages of results, in days; RESULTS=--smoke a short trial of each part, RESULTS=walks one page
 # make lint: style, and types of what other programs import
@@ -12,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # with a failure: with another in its place, xdist waits for ever.
 PYTEST := .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
-.PHONY: setup demo test bounds documents docs results lowest lint clean
+.PHONY: setup demo test bounds documents notebooks docs results lowest lint clean
 
 setup:
 	@./setup.sh
@@ -35,10 +36,16 @@ bounds: setup
 documents: setup
 	@DOCUMENTS=1 .venv/bin/python -m pytest tests/documents
 
+notebooks: setup
+	@.venv/bin/python -m docs.notebooks
+
 docs: setup
 	@cmp -s requirements-docs.lock build/docs/.ready || { .venv/bin/python -m venv --clear build/docs && \
 		build/docs/bin/python -m pip install -qq --no-deps -r requirements-docs.lock && \
 		cp requirements-docs.lock build/docs/.ready; }
+	@.venv/bin/python -m docs.notebooks --changed
+	@build/docs/bin/jupyter nbconvert --log-level WARN --to markdown --output-dir build/notebooks/pages \
+		build/notebooks/*.ipynb
 	@.venv/bin/python docs/pages.py
 	@NO_MKDOCS_2_WARNING=1 build/docs/bin/mkdocs build --strict --quiet
 	@echo build/site/index.html

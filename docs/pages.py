@@ -17,6 +17,8 @@ PAGES = ROOT / "build" / "pages"
 LINK = re.compile(r"\]\(([^)#:]+)\)")
 #: A link to a folder, which a site has none of.
 FOLDER = re.compile(r"\[([^]]+)\]\([^)#:]+/\)")
+#: Notebooks as pages, with their outputs, and a link to a notebook.
+NOTEBOOKS, NOTEBOOK = ROOT / "build" / "notebooks" / "pages", re.compile(r"(\]\([^):]+)\.ipynb\)")
 
 
 def lay_out() -> None:
@@ -31,11 +33,19 @@ def lay_out() -> None:
         place.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, place)
         if path.suffix == ".md":
-            place.write_text(FOLDER.sub(r"\1", path.read_text()))
+            place.write_text(for_site(path.read_text()))
+    shutil.copytree(NOTEBOOKS, PAGES / "notebooks")
+    for page in (PAGES / "notebooks").glob("*.md"):
+        page.write_text(for_site(page.read_text()))
     reference = ["# Commands", "", "`--debug` shows the traceback of an error.", ""]
     for name, app in (("radarize", radarize.app), ("radarsim", radarsim.app)):
         reference += described(name, typer.main.get_command(app))
     (PAGES / "docs" / "reference" / "commands.md").write_text("\n".join(reference))
+
+
+def for_site(text: str) -> str:
+    """A page with links to pages alone."""
+    return NOTEBOOK.sub(r"\1.md)", FOLDER.sub(r"\1", text))
 
 
 def described(name: str, command: TyperCommand) -> list[str]:

@@ -1,7 +1,14 @@
-"""Draws the pictures of the README.
+"""Draws the pictures of README and docs.
 
-python -m docs.pictures                  the scenes': plans and renderings
-python -m docs.pictures RUN REC.h5       those of the demo besides, after `make demo`
+python -m docs.pictures                  plans and renderings of scenes
+python -m docs.pictures REC.h5 RUN       also heat maps of a recording, and map and trajectories of a run
+
+`heatmaps.png` is of the demo's recording, `run.png` of a longer walk, on which odometry drifts by metres:
+
+    make demo
+    radarsim simulate buildings/b -o runs/long.h5 --platform handheld --duration 200 --seed 1
+    radarize run runs/long.h5 -o runs/long
+    python -m docs.pictures runs/demo/office.h5 runs/long
 """
 
 import sys
@@ -47,24 +54,26 @@ def heat_maps(recording: Path, seconds: float) -> plt.Figure:
 
 
 def trajectory_and_map(run: Path) -> plt.Figure:
-    """Floor plan, map and trajectories from above."""
+    """Floor plan, map and trajectories from above; each trajectory is aligned by itself, as for its ATE."""
     folder = RunFolder(run)
     errors, scans = trajectory_errors(folder), folder.scans
     slam = errors["slam"]
-    figure, axis = plt.subplots(figsize=(11, 7.4), layout="constrained")
+    figure, axis = plt.subplots(figsize=(11, 7.2), layout="constrained")
     plan = scans["truth/floor_plan"]
-    axis.plot(plan[:, [0, 2]].T, plan[:, [1, 3]].T, color="0.55", lw=0.8)
+    axis.plot(plan[:, [0, 2]].T, plan[:, [1, 3]].T, color="0.75", lw=0.8)
+    axis.plot([], [], color="0.75", lw=1.5, label="true floor plan")
     grid = folder.map
     cells = grid.centers(grid.occupied)
     cells = np.column_stack([cells, np.zeros(len(cells))]) @ slam.turn.T + slam.shift
-    axis.plot(cells[:, 0], cells[:, 1], "s", color="#7b52c7", ms=1.6, label="map (occupied cells)")
-    for name, item, color in (("odometry", errors["odometry"], COLORS["odometry"]), ("SLAM", slam, COLORS["slam"])):
+    axis.plot(cells[:, 0], cells[:, 1], "s", color=COLORS["map"], ms=1.6, label="map by SLAM (occupied cells)")
+    for name, item, style in (("odometry", errors["odometry"], {"ls": "--", "lw": 1.3}), ("slam", slam, {"lw": 2.4})):
         path = item.estimate.positions_xyz
-        axis.plot(path[:, 0], path[:, 1], color=color, lw=1.6, label=f"{name}: mean error {item.position.mean:.2f} m")
+        title = f"{'SLAM' if name == 'slam' else name}: mean ATE {item.position.mean:.2f} m"
+        axis.plot(path[:, 0], path[:, 1], color=COLORS[name], label=title, **style)
     truth = slam.reference.positions_xyz
-    axis.plot(truth[:, 0], truth[:, 1], "--", color="#128a50", lw=1.2, label="truth")
+    axis.plot(truth[:, 0], truth[:, 1], ":", color="k", lw=1.6, label="truth")
     axis.set(aspect="equal", xlabel="x, m", ylabel="y, m")
-    axis.legend(loc="upper right", framealpha=0.9)
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=3, frameon=False, markerscale=4)
     return figure
 
 
@@ -83,8 +92,9 @@ def main() -> None:
     HERE.mkdir(exist_ok=True)
     scenes()
     if len(sys.argv) == 3:
-        run, recording = map(Path, sys.argv[1:])
+        recording, run = map(Path, sys.argv[1:])
         heat_maps(recording, seconds=5.5).savefig(HERE / "heatmaps.png", dpi=70)
+        plt.rcParams.update({"font.size": 13})
         trajectory_and_map(run).savefig(HERE / "run.png", dpi=75)
 
 

@@ -105,7 +105,7 @@ def test_the_lock_pins_everything_and_names_nothing_else():
 
 
 def test_the_lock_is_complete():
-    extras = ("sim", "ray", "viewer", "onnx", "test", "dev")
+    extras = ("sim", "ray", "viewer", "onnx", "test", "notebooks", "dev")
     lines = [*PROJECT["dependencies"], *(line for extra in extras for line in PROJECT["optional-dependencies"][extra])]
     wanted = [Requirement(line) for line in lines if not line.startswith("radarize[")]
     for name in LOCK:

@@ -11,6 +11,24 @@ from radarsim.world.scene import Scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Colour and hatch of materials on the plan. Renderings have natural colours, of which many are the same grey.
+STYLES: dict[str, tuple[str, str]] = {
+    "acrylic": ("#101014", ""),
+    "asphalt": ("#5a5a5a", "xxx"),
+    "brick": ("#c0492b", "---"),
+    "carpet": ("#a9bfdd", ""),
+    "chipboard": ("#f3dca6", ""),
+    "concrete": ("#8a8a8a", ""),
+    "fabric": ("#2b4fb0", "..."),
+    "floorboard": ("#d9a566", "||"),
+    "glass": ("#25b4e6", ""),
+    "marble": ("#e0cdec", ""),
+    "metal": ("#0f7f6b", ""),
+    "plasterboard": ("#d08c8c", ""),
+    "plywood": ("#d99c4a", ""),
+    "vinyl": ("#f4f3ea", ""),
+    "wood": ("#8a4f1d", "///"),
+}
 #: Height of the cut, m: above sills, through windows and doors. Objects below are seen from above.
 CUT = 1.25
 #: Fraction of the scene's height from which an object is part of the building.
@@ -22,6 +40,7 @@ def blueprint(scene: Scene) -> "Figure":
     """The plan as a matplotlib figure, with a scale and the materials' colours."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colors import to_hex, to_rgb
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
@@ -30,18 +49,25 @@ def blueprint(scene: Scene) -> "Figure":
     figure = Figure(figsize=(12, np.clip(12 * size[1] / size[0], 3, 14) + 0.8))
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    colors = np.array([o.material.color for o in scene.objects])
+    styles = {o.material.name: STYLES.get(o.material.name, (to_hex(o.material.color), "")) for o in scene.objects}
+    materials = np.array([o.material.name for o in scene.objects])
+    colors = np.array([to_rgb(styles[name][0]) for name in materials])
     height = min(low[2] + CUT, (low[2] + high[2]) / 2)
 
     # Floors, and on them the objects below the cut, from the lowest upwards.
     up = (scene.normals[:, 2] > 0.5) & (scene.triangles[:, :, 2].max(axis=1) < height)
     order = np.flatnonzero(up)[np.argsort(scene.triangles[up][:, :, 2].mean(axis=1), kind="stable")]
-    on_floor = scene.triangles[order][:, :, 2].max(axis=1) < low[2] + 0.02
-    pale = np.where(on_floor[:, None], 0.22, 0.55)
-    faces = 1 - pale + pale * colors[scene.triangle_object[order]]
-    axes.add_collection(
-        PolyCollection(list(scene.triangles[order][:, :, :2]), facecolors=faces, edgecolors="face", linewidths=0.3)
-    )
+    below = materials[scene.triangle_object[order]]
+    shown = set(below)
+    for run in np.split(np.arange(len(order)), np.flatnonzero(below[1:] != below[:-1]) + 1):
+        if len(run):
+            color, hatch = styles[below[run[0]]]
+            corners = list(scene.triangles[order[run]][:, :, :2])
+            axes.add_collection(PolyCollection(corners, facecolors=color, edgecolors="face", linewidths=0.3))
+            if hatch:
+                axes.add_collection(
+                    PolyCollection(corners, facecolors="none", edgecolors="w", hatch=hatch, linewidths=0)
+                )
     top = np.array([o.mesh.bounds[1, 2] for o in scene.objects])
     wall = top > low[2] + _WALL * size[2]
     for level in _OUTLINES:
@@ -57,21 +83,24 @@ def blueprint(scene: Scene) -> "Figure":
         face = "0.2" if wall[owner] or area.area > 1.0 else colors[owner]
         for ring in _filled(area):
             axes.fill(*ring.T, facecolor=face, edgecolor="none", zorder=3)
-    shade = np.where(wall[cut.owner, None], 0.85, 0.7) * colors[cut.owner]
-    axes.add_collection(
-        LineCollection(list(cut.lines), colors=shade, linewidths=np.where(wall[cut.owner], 1.3, 0.7), zorder=4)
-    )
+    shown |= set(materials[cut.owner])
+    widths = np.where(wall[cut.owner], 1.3, 0.7)
+    axes.add_collection(LineCollection(list(cut.lines), colors=colors[cut.owner], linewidths=widths, zorder=4))
 
-    seen = {o.material.name: o.material.color for o in scene.objects}
-    handles = [Patch(facecolor=color, edgecolor="0.5", label=name) for name, color in sorted(seen.items())]
-    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.55, 0.0), ncols=7, frameon=False, fontsize=9)
+    handles = [Patch(facecolor="0.2", label="cut through a wall")]
+    for name in sorted(shown):
+        color, hatch = styles[name]
+        handles.append(
+            Patch(facecolor=color, edgecolor="w" if hatch else "0.5", hatch=hatch, label=name, linewidth=0.5)
+        )
+    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.55, 0.0), ncols=6, frameon=False, fontsize=11)
     length = 5.0 if size[0] > 12 else 1.0
     x, y = low[0], low[1] - 0.045 * size[1]
     for k in range(5):
         axes.barh(y, length / 5, 0.012 * size[1], x + k * length / 5, color="0.15" if k % 2 == 0 else "w", ec="0.15")
-    axes.text(x + length + 0.2, y, f"{length:.0f} m", va="center", fontsize=9)
+    axes.text(x + length + 0.2, y, f"{length:.0f} m", va="center", fontsize=11)
     axes.set(xlim=(low[0] - 0.4, high[0] + 0.4), ylim=(y - 0.02 * size[1], high[1] + 0.4), aspect="equal")
-    axes.set_title(f"{scene.name}: {size[0]:.1f} x {size[1]:.1f} m", fontsize=11)
+    axes.set_title(f"{scene.name}: {size[0]:.1f} x {size[1]:.1f} m", fontsize=13)
     axes.set_axis_off()
     return figure
 

@@ -29,7 +29,7 @@ def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarr
         InputError: no usable LLVM.
     """
     opened = Scene(scene.name, cut_open(scene))
-    eye, target, tangent, height = _camera(opened.triangles.reshape(-1, 3), width)
+    eye, target, tangent, height = camera(opened.triangles.reshape(-1, 3), width)
     world = opened.sionna  # before Sionna RT is loaded: this selects the LLVM
     import sionna.rt as rt
 
@@ -58,7 +58,7 @@ def cut_open(scene: Scene) -> list[SceneObject]:
     return [*found, SceneObject(CAP.name, shapes.joined(*caps), CAP)] if caps else found
 
 
-def _camera(
+def camera(
     corners: Float[np.ndarray, "n 3"], width: int
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], float, int]:
     """Eye, target, tangent of half the field of view across and picture height that just contain all corners."""

@@ -7,6 +7,7 @@ import typer
 
 from radarize.io.console import new_app, print_table, progress, run, working
 from radarize.io.errors import InputError
+from radarize.io.plugins import Plugins
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
 scene_app = typer.Typer(help="Look at a scene without simulating it.", no_args_is_help=True)
@@ -265,16 +266,14 @@ def import_(
 @app.command()
 def export(
     recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording to convert.")],
-    to: Annotated[
-        Literal["dca1000", "rosbag", "tum"], typer.Option(help="Raw samples + .cfg, a ROS 2 bag, or the true poses.")
-    ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="What to write (.bin, a folder, .tum).")],
+    format: Annotated[str, typer.Option(help=f"Format: {', '.join(Plugins('radarize.exporters', 'export format'))}.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of ros2 and roverd, folder to write.")],
 ) -> None:
-    """Write a recording in another format, as `radarize export` does."""
+    """Write a recording in another format; `radarize export` has more options."""
     from radarize.io.exporters import export
 
     with progress("export") as report:
-        written = export(recording, {"dca1000": "bin", "rosbag": "ros2"}.get(to, to), output, progress=report)
+        written = export(recording, format, output, progress=report)
     print(written)
 
 

@@ -124,8 +124,8 @@ def export(
     format: Annotated[
         str,
         typer.Option(
-            help="bin (DCA1000 and .cfg), ros2 (a bag), radarize-ae (a ROS 1 bag for the paper's code), roverd, tum "
-            "(poses), ply (points of a recording, scans of a run) or map (for map_server)."
+            help=f"Format: {names('radarize.exporters')}. bin: DCA1000 samples and .cfg; ros2: a bag; radarize-ae: "
+            "a ROS 1 bag for the paper's code; tum: poses; ply: points; map: a run's map for map_server."
         ),
     ],
     run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,

@@ -48,44 +48,55 @@ class Velocities:
 
 
 class DopplerConfig(Frozen):
-    """Velocity from the Doppler shifts of single echoes (`DopplerVelocity`)."""
+    """Ego-velocity from the Doppler shifts of single echoes (`DopplerVelocity`)."""
 
-    beams: int = setting(48, "azimuth beams of the cube, uniform in u_y", ge=8)
-    echoes: int = setting(160, "strongest peaks kept per frame", ge=4)
-    threshold: float = setting(20.0, "least peak power over the cube's median", gt=1)
-    min_range: float = setting(0.25, "m; nearer peaks are leakage", ge=0)
-    inlier: float = setting(0.15, "m/s, RANSAC's limit on the residual", gt=0)
-    hypotheses: int = setting(200, "pairs of echoes that RANSAC tries", ge=1)
-    speed_noise: float = setting(0.003, "m/s, standard deviation of a strong echo's speed", gt=0)
+    beams: int = setting(
+        48, "azimuth beams of the range-Doppler-azimuth cube, uniform in u_y, the sine of azimuth", "beams", ge=8
+    )
+    echoes: int = setting(160, "maximum number of echoes per frame, strongest first", "echoes", ge=4)
+    threshold: float = setting(20.0, "minimum power of an echo over the median of the cube", "1", gt=1)
+    min_range: float = setting(0.25, "minimum range of an echo; nearer peaks are transmitter leakage", "m", ge=0)
+    inlier: float = setting(0.15, "maximum residual of an inlier in RANSAC", "m/s", gt=0)
+    hypotheses: int = setting(200, "pairs of echoes that RANSAC tries", "pairs", ge=1)
+    speed_noise: float = setting(0.003, "standard deviation of the radial velocity of a strong echo", "m/s", gt=0)
     power_noise: float = setting(
-        0.1, "m/s, the same of an echo no stronger than the median of the cube, falling with its amplitude", gt=0
-    )
-    azimuth_noise: float = setting(0.005, "standard deviation of an echo's u_y", gt=0)
+        0.1, "standard deviation of the radial velocity of an echo at the median of the cube; it decreases with "
+        "amplitude", "m/s", gt=0
+    )  # fmt: skip
+    azimuth_noise: float = setting(0.005, "standard deviation of an echo's u_y", "1", gt=0)
     elevation: float = setting(
-        0.4, "standard deviation of u_z over all echoes, by which readings are drawn to the horizon", gt=0
-    )
+        0.4, "prior standard deviation of u_z, the sine of elevation, over all echoes; it shrinks measured u_z "
+        "towards the horizon", "1", gt=0
+    )  # fmt: skip
     beam: float = setting(
-        0.25, "the most that u_z varies within one echo, which the beam limits; taken if not known", gt=0
+        0.25, "maximum standard deviation of u_z within one echo, set by the elevation beam; used where no "
+        "elevation pair measures it", "1", gt=0
+    )  # fmt: skip
+    climb: float = setting(
+        0.15, "standard deviation of the vertical velocity of a handheld radar; its mean is zero", "m/s", gt=0
     )
-    climb: float = setting(0.15, "m/s, expected vertical speed (handheld bobbing); its mean is zero", gt=0)
     still: float = setting(
-        0.02, "m/s; below it and within the fit's own error, if most echoes are still, the sensor stands", ge=0
-    )
+        0.02, "speed below which the sensor is at rest, if the speed is within its standard error and most echoes "
+        "are at rest", "m/s", ge=0
+    )  # fmt: skip
     few: float = setting(
-        32.0, "agreeing echoes for which the covariance of the fit is doubled, and more for fewer, of which a larger "
-        "share has come over several surfaces; chosen on 12 walks of 60 s (handheld, cart, robot; A to D of seeds 301 "
-        "to 304)", ge=0
+        32.0, "inliers at which the covariance of the fit is doubled; with fewer it grows further, because a larger "
+        "share of them has come over several surfaces", "echoes", tuned="12 walks of 60 s (FURNISHED)", ge=0
     )  # fmt: skip
     scale_noise: float = setting(
-        0.003, "of the speed, standard deviation of what echoes share along it: their elevation", ge=0
-    )
-    course_noise: float = setting(0.0065, "rad, of what they share across it: azimuths that are off to one side", ge=0)
-    rough: float = setting(
-        0.06, "of the speed, standard deviation of what echoes share along it and across it where the array tells no "
-        "elevation; twice that in rows of fewer than 8 antennas; chosen on two walks of 20 s (by hand in A, seed 301, "
-        "by cart in C, seed 303) with two transmitters, the first also with one, and by two other boards", ge=0
+        0.003, "standard deviation of the error along the velocity that all echoes of a frame share (elevation), as "
+        "a fraction of speed", "1", tuned="6 walks of 20 s (ODOMETRY)", ge=0
     )  # fmt: skip
-    floor: float = setting(0.0005, "m/s, least standard deviation of a velocity", ge=0)
+    course_noise: float = setting(
+        0.0065, "standard deviation of the error across the velocity that all echoes of a frame share (azimuth)",
+        "rad", tuned="6 walks of 20 s (ODOMETRY)", ge=0
+    )  # fmt: skip
+    rough: float = setting(
+        0.06, "standard deviation of the shared error along and across the velocity, as a fraction of speed, for "
+        "arrays that do not measure elevation; twice that for azimuth rows of fewer than 8 antennas", "1", tuned="2 "
+        "walks of 20 s with one and two transmitters and with two other boards (RADARS)", ge=0
+    )  # fmt: skip
+    floor: float = setting(0.0005, "minimum standard deviation of a velocity", "m/s", ge=0)
 
 
 class DopplerVelocity:

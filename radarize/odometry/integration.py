@@ -78,11 +78,13 @@ class Track:
 
 
 class VelocityConfig(Frozen):
-    """Filter of velocities (`VelocityFilter`)."""
+    """Kalman filter of velocities (`VelocityFilter`)."""
 
-    wander: float = setting(0.73, "m/s^1.5, by how much the velocity of a handheld radar wanders in a second", gt=0)
-    fastest: float = setting(2.0, "m/s, standard deviation of a velocity not known at all", gt=0)
-    gate: float = setting(9.0, "squared Mahalanobis distance from which a measurement counts less (Huber-like)", gt=0)
+    wander: float = setting(0.73, "random-walk density of the velocity of a handheld radar", "m/s^1.5", gt=0)
+    fastest: float = setting(2.0, "standard deviation of an unknown velocity", "m/s", gt=0)
+    gate: float = setting(
+        9.0, "squared Mahalanobis distance above which a measurement is down-weighted (Huber)", "1", gt=0
+    )
 
 
 class VelocityFilter:

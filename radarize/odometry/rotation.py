@@ -92,46 +92,50 @@ class Rotations:
 
 
 class RotationConfig(Frozen):
-    """Matching of frames with a local map (`MapRotation`)."""
+    """Rotation by matching frames with a local map (`MapRotation`)."""
 
-    field: float = setting(0.85, "largest |sin azimuth| used", gt=0, lt=1)
-    columns: int = setting(69, "azimuth columns, uniform in sin azimuth", ge=8)
-    min_range: float = setting(0.2, "m; nearer bins are leakage", ge=0)
-    limit: float = setting(300.0, "power over the noise floor at which a range-Doppler cell is limited", gt=0)
+    field: float = setting(0.85, "maximum |sin azimuth| that is used", "1", gt=0, lt=1)
+    columns: int = setting(69, "azimuth columns, uniform in sin azimuth", "columns", ge=8)
+    min_range: float = setting(0.2, "minimum range; nearer bins are transmitter leakage", "m", ge=0)
+    limit: float = setting(300.0, "power over the noise floor at which a range-Doppler cell is clipped", "1", gt=0)
     stretch: float = setting(
-        1.0, "by how much larger sines of azimuth are taken than the array reads; where antennas stand otherwise than "
-        "the board's file says, `radarize calibrate` measures it; on eight furnished walks of 20 s (seeds 701 to 708) "
-        "mean ATE of SLAM is 0.056 m instead of 0.090 m with 1.025", ge=1, lt=1.1
+        1.0, "factor applied to measured sin azimuth; `radarize calibrate` measures it where the spacing of the "
+        "antennas differs from the board's file", "1", tuned="8 furnished walks of 20 s (seeds 701 to 708): mean "
+        "ATE of SLAM is 0.056 m with 1.0 and 0.090 m with 1.025", ge=1, lt=1.1
     )  # fmt: skip
-    contrast: float = setting(15.0, "dB over the surroundings at which a map cell is clipped", gt=0)
-    cell: float = setting(0.05, "m, side of a map cell", gt=0)
+    contrast: float = setting(15.0, "level over the surroundings at which a map cell is clipped", "dB", gt=0)
+    cell: float = setting(0.05, "side of a map cell", "m", gt=0)
     memory: float = setting(
-        1.6, "s over which the map forgets; chosen with `turns.alike`: heading over 10 s is off by 4.0 deg instead of "
-        "4.9 on seven walks, and 3.1 instead of 3.8 on three that were not looked at for it", gt=0
-    )  # fmt: skip
-    fan: float = setting(np.radians(5.0), "rad, least half width of the yaws tried", gt=0)
-    widest: float = setting(np.radians(75.0), "rad, the most, however unsure the prediction", gt=0, le=np.pi)
-    step: float = setting(np.radians(0.5), "rad, spacing of the yaws tried; thrice that at first", gt=0)
+        1.6, "time constant with which the map forgets", "s", tuned="7 walks of 20 to 60 s (TURNS)", gt=0
+    )
+    fan: float = setting(np.radians(5.0), "minimum half-width of the search over yaw", "rad", gt=0)
+    widest: float = setting(np.radians(75.0), "maximum half-width of the search over yaw", "rad", gt=0, le=np.pi)
+    step: float = setting(
+        np.radians(0.5), "step of the search over yaw; the coarse search takes three times that", "rad", gt=0
+    )
     wander: float = setting(
-        np.radians(66.0), "rad/s^1.5, by how much the turning rate of a handheld radar wanders in 1 s", gt=0
+        np.radians(66.0), "random-walk density of the turn rate of a handheld radar", "rad/s^1.5", gt=0
     )
-    fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of a rate not known at all", gt=0)
-    yaw_noise: float = setting(np.radians(0.3), "rad, standard deviation of a match of correlation 1", gt=0)
+    fastest: float = setting(np.radians(60.0), "standard deviation of an unknown turn rate", "rad/s", gt=0)
+    yaw_noise: float = setting(
+        np.radians(0.3), "standard deviation of the yaw of a match with correlation 1", "rad", gt=0
+    )
     guided_yaw_noise: float = setting(
-        np.radians(1.6), "rad, the same beside a network: a map that lags in a turn misleads many matches alike", gt=0
-    )
-    doubt: float = setting(
-        4.0, "by how much more the variance of a network's turn is than it says; chosen with the noise above and with "
-        "what bearings are believed on 15 walks: heading is off by 0.9 deg on average instead of 3.0", ge=1
+        np.radians(1.6), "the same where a network estimates turns too; larger, because a map that lags in a turn "
+        "biases many consecutive matches", "rad", tuned="15 walks of 60 s (of BEARINGS)", gt=0
     )  # fmt: skip
-    least_correlation: float = setting(0.15, "a match below it is not believed", ge=0, lt=1)
+    doubt: float = setting(
+        4.0, "factor on the variance of a network's turn", "1",
+        tuned="15 walks of 60 s (of BEARINGS), mean heading error 0.9 deg", ge=1
+    )  # fmt: skip
+    least_correlation: float = setting(0.15, "minimum correlation of an accepted match", "1", ge=0, lt=1)
     right_angles: bool = setting(
-        True, "walls that are seen again correct the heading, most of a building's being at right angles; false for "
-        "buildings whose walls are not"
+        True, "correct the heading by wall directions, assuming that most walls of a building are at right angles; "
+        "false for other buildings"
     )  # fmt: skip
     unseen: float = setting(
-        np.radians(40.0), "rad/s^0.5, by how much yaw is claimed to wander where neither matches nor bearings tell it, "
-        "beside what the filter says: whoever turns there turns by 40 to 80 deg", ge=0
+        np.radians(40.0), "random-walk density of the yaw where neither matches nor bearings observe it, added to "
+        "that of the filter", "rad/s^0.5", ge=0
     )  # fmt: skip
 
 

@@ -1,5 +1,4 @@
-"""All that somebody may want to set of the pipeline, in one place: ``radarize config`` prints it, and ``radarize run
---config mine.yaml`` takes it."""
+"""All settings of the pipeline: ``radarize config`` prints them, ``radarize run --config mine.yaml`` reads them."""
 
 import json
 from collections.abc import Iterator
@@ -7,8 +6,9 @@ from pathlib import Path
 from textwrap import wrap
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
-from radarize.io.plain import Frozen, setting
+from radarize.io.plain import Frozen, tuned_on, unit_of
 from radarize.io.yamlfile import read_settings
 from radarize.odometry.doppler import DopplerConfig
 from radarize.odometry.integration import VelocityConfig
@@ -20,20 +20,20 @@ from radarize.slam.config import SlamConfig
 
 
 class Configuration(Frozen):
-    """The pipeline's settings; each section belongs to one step, and is described where that step stands."""
+    """Settings of the pipeline, one section per step."""
 
-    heatmaps: HeatmapConfig = setting(HeatmapConfig(), "spectra and beamformers of the classical methods")
-    scans: ScanConfig = setting(ScanConfig(), "echoes in range-azimuth maps, of scans without networks")
-    doppler: DopplerConfig = setting(DopplerConfig(), "velocity from single echoes")
-    rotation: RotationConfig = setting(RotationConfig(), "turns by matching frames with a local map")
-    velocity: VelocityConfig = setting(VelocityConfig(), "filter of velocities, whoever tells them")
-    fusion: FusionConfig = setting(FusionConfig(), "velocities by network and Doppler together")
-    turns: TurnConfig = setting(TurnConfig(), "turns by the network")
-    slam: SlamConfig = setting(SlamConfig.preset("radar"), "the back end")
+    heatmaps: HeatmapConfig = HeatmapConfig()
+    scans: ScanConfig = ScanConfig()
+    doppler: DopplerConfig = DopplerConfig()
+    rotation: RotationConfig = RotationConfig()
+    velocity: VelocityConfig = VelocityConfig()
+    fusion: FusionConfig = FusionConfig()
+    turns: TurnConfig = TurnConfig()
+    slam: SlamConfig = SlamConfig.preset("radar")
 
     @classmethod
     def load(cls, path: str | Path) -> "Configuration":
-        """The defaults with what a YAML file says otherwise: sections and fields named as here.
+        """Return the defaults with the values of a YAML file in their place; sections and fields as above.
 
         Raises:
             InputError: no such file, or a field that does not exist or has an impossible value.
@@ -41,17 +41,34 @@ class Configuration(Frozen):
         return read_settings(path, cls(), "sections as `radarize config` prints")
 
     def text(self) -> str:
-        """As YAML, with what each field means beside it."""
-        return "\n".join(_lines(self, "")) + "\n"
+        """Return the settings as YAML, with a comment above each: description, unit, recordings it was tuned on."""
+        return _HEAD + "\n".join(_lines(self, "")) + "\n"
+
+
+_HEAD = """\
+# Settings of the pipeline. Units are in brackets; [1] is a number without a unit. Names in capitals are sets of
+# recordings in radarize/evaluation/benchmark/choices.yaml.
+"""
+
+
+def summary(section: type[BaseModel]) -> str:
+    """Return the first line of a section's docstring without markup and full stop."""
+    return (section.__doc__ or "").split("\n")[0].rstrip(".").replace("`", "")
 
 
 def _lines(section: BaseModel, indent: str) -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
-        if field.description:
-            yield from wrap(field.description, 118, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ")
-        if isinstance(value, BaseModel):
+        nested = isinstance(value, BaseModel)
+        comment = summary(type(value)) if nested else _comment(field)
+        yield from wrap(comment, 118, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ")
+        if nested:
             yield f"{indent}{name}:"
             yield from _lines(value, indent + "  ")
         else:
             yield f"{indent}{name}: {json.dumps(value)}"
+
+
+def _comment(field: FieldInfo) -> str:
+    unit, tuned = unit_of(field), tuned_on(field)
+    return f"{field.description}{f' [{unit}]' if unit else ''}{f'. Tuned on {tuned}' if tuned else ''}"

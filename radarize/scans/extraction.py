@@ -21,28 +21,27 @@ from radarize.signal.points import Cfar, level_around
 
 
 class ScanConfig(Frozen):
-    """Detection of echoes in range-azimuth maps."""
+    """Detection of echoes in range-azimuth maps, for scans without networks."""
 
-    min_range: float = setting(0.3, "m, nearer cells hold transmitter leakage", ge=0)
-    above_noise_db: float = setting(15.0, "dB, an echo stands so far above the noise", gt=0)
+    min_range: float = setting(0.3, "minimum range of an echo; nearer cells hold transmitter leakage", "m", ge=0)
+    above_noise_db: float = setting(15.0, "minimum level of an echo above the noise", "dB", gt=0)
     below_ring_db: float = setting(
-        15.0, "dB, an echo lies at most so far below the strongest of all bearings at its range; what is weaker is "
-        "taken for that echo's sidelobe", gt=0
+        15.0, "maximum level of an echo below the strongest cell at its range; weaker ones are taken for sidelobes",
+        "dB", gt=0
     )  # fmt: skip
     below_bearing_db: float = setting(
-        6.0, "dB, the same below the strongest of all ranges on its bearing; what is weaker and nearer is clutter "
-        "above or below the plane, or the skirt of a neighbour: in simulated offices 6 dB halves the echoes that come "
-        "too early and costs one in ten of the others", gt=0
+        6.0, "maximum level of an echo below the strongest cell on its bearing; weaker and nearer ones are clutter "
+        "above or below the plane, or the skirt of a neighbour. 6 dB halves the echoes that are too near and "
+        "removes one in ten of the others", "dB", tuned="simulated offices", gt=0
     )  # fmt: skip
     noise_quantile: float = setting(
-        0.25, "the noise is this quantile of a frame's cells: most of a room's cells are behind its walls", gt=0, lt=1
-    )
-    cfar: Cfar = setting(
-        Cfar(window=8, guard=4, threshold=10.0), "what an echo stands above in range and in bearing, for scans by cfar"
-    )
+        0.25, "quantile of a frame's cells that is taken as noise level; most cells of a room are behind its walls",
+        "1", gt=0, lt=1
+    )  # fmt: skip
+    cfar: Cfar = Cfar(window=8, guard=4, threshold=10.0)
     elevation_power: float = setting(
-        2.0, "how strongly echoes from above and below are weighed down, for scans by elevation-aware: a cell's power "
-        "is multiplied with (elevation-aware / reference power)^this, at most 1", gt=0
+        2.0, "exponent that attenuates echoes off the horizon, for scans by elevation-aware: power is multiplied "
+        "with (elevation-aware / reference power)^exponent, at most 1", "1", gt=0
     )  # fmt: skip
 
 

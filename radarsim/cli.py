@@ -335,6 +335,18 @@ def emulate(
 
 
 @app.command()
+def schema(
+    name: Annotated[Literal["scene", "dataset", "front-end", "board"], typer.Argument(help="Kind of YAML file.")],
+) -> None:
+    """Print the JSON schema of a kind of YAML file, by which editors complete and check it."""
+    import json
+
+    from radarsim.schema import schema
+
+    print(json.dumps(schema(name), indent=2))
+
+
+@app.command()
 def doctor(
     report: Annotated[bool, typer.Option("--report", help="Print text for a bug report instead.")] = False,
 ) -> None:

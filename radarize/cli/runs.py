@@ -58,10 +58,18 @@ def run_(
 
 
 @app.command("config")
-def config_() -> None:
-    """Print all settings of the pipeline as YAML, with what they mean: `radarize config > mine.yaml`."""
+def config_(
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of such files instead.")] = False,
+) -> None:
+    """Print all settings of the pipeline as YAML with description and unit: `radarize config > mine.yaml`."""
+    import json
+
+    from radarize.io.schema import json_schema
     from radarize.pipeline.config import Configuration
 
+    if schema:
+        print(json.dumps(json_schema(Configuration, "Configuration of the pipeline"), indent=2))
+        return
     print(Configuration().text(), end="")
 
 

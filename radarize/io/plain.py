@@ -3,14 +3,16 @@
 from reprlib import repr as shortened
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
+
+from radarize.io.schema import Described
 
 #: Of any number that somebody may set, in its unit.
 MOST = 1_000_000
 
 
-class Frozen(BaseModel):
+class Frozen(Described):
     """Immutable model that accepts no unknown field."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -5,9 +5,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Complex, Float
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from radarize.io.errors import InputError
+from radarize.io.schema import Described
 from radarize.radar.boards import BOARDS, SUFFIXES, Board, expected, load_board
 
 SPEED_OF_LIGHT = 299_792_458.0
@@ -44,7 +45,7 @@ def _receivers(fields: dict[str, Any]) -> tuple[int, ...]:
     return tuple(range(len(load_board(fields["board"]).rx))) if "board" in fields else ()
 
 
-class RadarConfig(BaseModel):
+class RadarConfig(Described):
     """One TDM-MIMO chirp profile of a TI xWR radar.
 
     Times count from the start of a chirp's cycle: idle time first, then the ramp, in which the ADC samples from

@@ -111,6 +111,20 @@ class Distribution:
         deviations = min(max(float(ndtri(low + share * (high - low))), -_END), _END)
         return first + last * deviations if self.kind == "normal" else first * float(np.exp(last * deviations))
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: object, handler: object) -> dict[str, Any]:
+        number = {"type": "number"}
+        two = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+        lists = {kind: two for kind in _NUMBERS} | {"choice": {"type": "array", "items": number, "minItems": 1}}
+        named = [
+            {
+                "type": "object", "properties": {kind: numbers | {"description": _NUMBERS[kind]}},
+                "required": [kind], "additionalProperties": False,
+            }
+            for kind, numbers in lists.items()
+        ]  # fmt: skip
+        return {"anyOf": [number, *named]}
+
     def __str__(self) -> str:
         numbers = ", ".join(f"{number:g}" for number in self.numbers)
         return numbers if self.kind == "constant" else f"{self.kind} {numbers}"

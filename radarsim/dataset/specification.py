@@ -49,6 +49,7 @@ from radarize.io.yamlfile import read_yaml
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
+from radarsim.dataset.fields import OF_SCENE, Place, SensorName
 from radarsim.dataset.randomise import OF_SENSOR, Platform, Randomise
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
@@ -56,8 +57,6 @@ from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import described, description_model, find, shipped, split_level
 from radarsim.world.validation import format_validation_error
 
-#: What a building here may say of itself that stands beside `building` in a scene file.
-OF_SCENE = "clutter", "unevenness", "furniture", "materials", "interferers"
 #: Recordings that a data set may stand for: a count with a digit too many takes all memory.
 MOST = 20_000
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
@@ -105,15 +104,30 @@ class Recordings(Frozen):
 
 
 class Specification(Frozen):
-    """A data set's specification; see the head of this file."""
+    """A data set's specification; see the head of this file.
+
+    Attributes:
+        name: of the data set.
+        seed: of all recordings.
+        buildings: by name: a generated building, a scene of the project, or a scene file beside this one.
+        recordings: groups of recordings.
+        radar: preset or .cfg file.
+        frontend: front-end file as `radarsim calibrate` writes it; default: the board's.
+        sensors: recorded beside the radar: some sensors, all or none.
+        storage: raw samples, or heat maps without samples for training.
+        variants: of every recording, by name, with the same seed and trajectory.
+        attributes: of the files.
+        randomise: distributions of what differs between recordings; default: that of real rooms; {}: nothing.
+        splits: into training, validation and test, by name.
+    """
 
     name: Name
     seed: int = Field(0, ge=0)
-    buildings: dict[Name, dict | str] = Field(min_length=1)
+    buildings: dict[Name, Annotated[dict | str, Place()]] = Field(min_length=1)
     recordings: tuple[Recordings, ...] = Field(min_length=1)
     radar: str = "radarize"
     frontend: str | None = None
-    sensors: tuple[str, ...] | Literal["all", "none"] = "none"
+    sensors: tuple[Annotated[str, SensorName()], ...] | Literal["all", "none"] = "none"
     storage: Literal["raw", "heatmaps"] = "raw"
     variants: dict[Name, Variant] = {}
     attributes: Attributes = {}

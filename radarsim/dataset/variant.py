@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from radarize.io.plain import Frozen
+from radarize.io.schema import Changes
 from radarize.io.yamlfile import changed
 from radarize.radar.boards import BOARDS, Board, load_board
 from radarize.radar.config import RadarConfig
@@ -28,8 +29,8 @@ class Variant(Frozen):
     """
 
     level: int = Field(0, ge=0)
-    radar: dict[str, object] | str = {}
-    frontend: dict[str, object] = {}
+    radar: Annotated[dict[str, object] | str, Changes(RadarConfig, tuple(PRESETS))] = {}
+    frontend: Annotated[dict[str, object], Changes(FrontEndConfig)] = {}
     mounting: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
     attributes: Attributes = {}
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 from jaxtyping import Complex, Float
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from radarize.io.errors import InputError
+from radarize.io.plain import Frozen
 from radarize.io.replacing import replacing
 from radarize.io.yamlfile import changed, read_yaml
 from radarize.radar.boards import Board, load_board
@@ -20,12 +21,13 @@ from radarsim.propagation.antenna import ISOTROPIC, Antenna
 from radarsim.world.validation import format_validation_error
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Channel(Frozen):
+    """A complex amplitude of one (tx, rx) channel.
 
-
-class Channel(_Strict):
-    """A complex value of one (tx, rx) channel."""
+    Attributes:
+        gain_db: magnitude, dB.
+        phase_deg: phase, degrees.
+    """
 
     gain_db: float
     phase_deg: float
@@ -43,7 +45,13 @@ class Channel(_Strict):
         )
 
 
-class _PerChannel(_Strict):
+class _PerChannel(Frozen):
+    """A property of each channel.
+
+    Attributes:
+        channels: measured amplitudes in physical order: TX1 x RX1, RX2, ..., then TX2, ...
+    """
+
     channels: tuple[Channel, ...] | None = None
 
     def measured(self, board: Board, source: str = "front end") -> Complex[np.ndarray, "tx rx"]:
@@ -114,7 +122,7 @@ class MountEcho(_PerChannel):
         return 2 * self.distance / SPEED_OF_LIGHT
 
 
-class PhaseNoise(_Strict):
+class PhaseNoise(Frozen):
     """Single-sideband phase noise of the transmitted signal.
 
     Attributes:
@@ -134,12 +142,17 @@ class PhaseNoise(_Strict):
         return self
 
 
-class Band(_Strict):
+class Band(Frozen):
     """The decimation filter's amplitude response over the beat frequency, as fractions of the sample rate.
 
     0 at `low`, 1 from 0 to `flat`, 0 from `high` on, straight in between. Noise of real captures falls by 2 to 9 dB in
     the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. Where it
     closes is as far as the simulator looks for echoes: they fade out there, and none pops.
+
+    Attributes:
+        low: beat frequency of zero response, below zero, as a fraction of the sample rate.
+        flat: end of the pass band.
+        high: beat frequency from which the response is zero.
     """
 
     low: float = Field(-0.06, lt=0)
@@ -162,7 +175,7 @@ class Band(_Strict):
         return np.sum(self.response(np.add.outer(aliases, x)) ** 2, axis=0)
 
 
-class FrontEndConfig(_Strict):
+class FrontEndConfig(Frozen):
     """Everything between the field at the antennas and the samples in the file.
 
     Attributes:

@@ -44,13 +44,14 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from radarize.io.errors import InputError
 from radarize.io.files import within
+from radarize.io.schema import Described
 from radarize.io.yamlfile import read_yaml
 from radarsim.world import plugins, shapes
 from radarsim.world.fields import Length, Name, Strict, Vector
 from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
-from radarsim.world.materials import DIELECTRICS, MATERIALS, Material, constant, decibel, material
+from radarsim.world.materials import DIELECTRICS, MATERIALS, Material, MaterialName, constant, decibel, material
 from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
@@ -72,17 +73,29 @@ class Parts(NamedTuple):
 
 
 class Custom(Strict):
-    """A material of constant permittivity, or a conductor."""
+    """A material of constant permittivity, or a conductor.
+
+    Attributes:
+        permittivity: relative permittivity.
+        conductivity: S/m.
+        conductor: a perfect conductor; permittivity and conductivity are not used.
+        roughness: RMS height of the surface, m.
+        sigma0_db: four times the fraction of incident power that is scattered diffusely, dB.
+        directive: fraction of the diffuse power in a lobe around the specular direction.
+        backscatter: fraction of the diffuse power in a lobe back to the source.
+        thickness: of a slab, through which part of the wave is transmitted, m; null: opaque.
+        clear: transparent to light, for the depth camera.
+    """
 
     permittivity: Annotated[float, Field(ge=1)] = 1.0
-    conductivity: Annotated[float, Field(ge=0)] = 0.0  # S/m
+    conductivity: Annotated[float, Field(ge=0)] = 0.0
     conductor: bool = False
-    roughness: Annotated[float, Field(ge=0)] = 0.0  # RMS height, m
-    sigma0_db: float = -60.0  # four times the share of power scattered diffusely, dB
-    directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0  # shares of it in lobes, see Material
+    roughness: Annotated[float, Field(ge=0)] = 0.0
+    sigma0_db: float = -60.0
+    directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     backscatter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     thickness: Length | None = None
-    clear: bool = False  # light passes, too
+    clear: bool = False
 
     def material(self, name: str) -> Material:
         law = None if self.conductor else constant(self.permittivity, self.conductivity)
@@ -94,16 +107,30 @@ class Custom(Strict):
 
 
 class CustomMaterial(Strict):
+    """A material that the scene file defines.
+
+    Attributes:
+        custom: its properties.
+    """
+
     custom: Custom
 
 
 class Shape(Strict, ABC):
-    """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there."""
+    """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there.
+
+    Attributes:
+        name: of the object.
+        shape: kind of object.
+        material: name of a material, or {custom: {...}}.
+        position: x, y, z of the centre, m.
+        solid: an open mesh is part of a body's surface and is seen from its outside only; false: it is a sheet.
+    """
 
     name: Name
-    material: str | CustomMaterial
+    material: MaterialName | CustomMaterial
     position: Vector = (0.0, 0.0, 0.0)
-    solid: bool = False  # part of the surface of a body, though open: seen from its outside only
+    solid: bool = False
 
     @abstractmethod
     def mesh(self, folder: Path) -> trimesh.Trimesh:
@@ -120,13 +147,25 @@ class Shape(Strict, ABC):
 
 
 class TurnedShape(Shape):
-    rotation: Vector = (0.0, 0.0, 0.0)  # roll, pitch, yaw in degrees
+    """An object that can be rotated.
+
+    Attributes:
+        rotation: roll, pitch, yaw, degrees.
+    """
+
+    rotation: Vector = (0.0, 0.0, 0.0)
 
     def _placed(self, shape: trimesh.Trimesh) -> trimesh.Trimesh:
         return shapes.placed(shape, self.position, np.deg2rad(self.rotation))
 
 
 class Box(TurnedShape):
+    """A box.
+
+    Attributes:
+        size: along x, y, z before rotation, m.
+    """
+
     shape: Literal["box"]
     size: tuple[Length, Length, Length]
 
@@ -135,8 +174,15 @@ class Box(TurnedShape):
 
 
 class Rectangle(Shape):
+    """A rectangle. Its height is vertical; where it lies flat, its height is along y and its width along x.
+
+    Attributes:
+        size: width and height, m.
+        facing: direction of the normal, x, y, z.
+    """
+
     shape: Literal["rectangle"]
-    size: tuple[Length, Length]  # width, height
+    size: tuple[Length, Length]
     facing: Vector
 
     def mesh(self, folder: Path) -> trimesh.Trimesh:
@@ -146,6 +192,14 @@ class Rectangle(Shape):
 
 
 class Cylinder(TurnedShape):
+    """A cylinder along z before rotation.
+
+    Attributes:
+        radius: m.
+        height: m.
+        sides: facets of its mesh.
+    """
+
     shape: Literal["cylinder"]
     radius: Length
     height: Length
@@ -156,6 +210,13 @@ class Cylinder(TurnedShape):
 
 
 class Sphere(Shape):
+    """A sphere.
+
+    Attributes:
+        radius: m.
+        subdivisions: of the icosahedron of its mesh; each has four times as many triangles.
+    """
+
     shape: Literal["sphere"]
     radius: Length
     subdivisions: Annotated[int, Field(ge=0, le=6)] = 3
@@ -165,6 +226,13 @@ class Sphere(Shape):
 
 
 class Mesh(TurnedShape):
+    """A mesh from a file.
+
+    Attributes:
+        file: .ply, .obj or .stl, relative to the scene file.
+        scale: factor on its coordinates.
+    """
+
     shape: Literal["mesh"]
     file: str
     scale: Length = 1.0
@@ -185,21 +253,38 @@ class Mesh(TurnedShape):
         return self._placed(shapes.mesh(self.scale * vertices, faces))
 
 
-class _Change(BaseModel):
+class _Change(Described):
+    """Fields of the entry of that name that change, or a new entry.
+
+    Attributes:
+        name: of an entry; * and ? are wildcards.
+    """
+
     model_config = ConfigDict(extra="allow", frozen=True)
 
     name: Name
 
 
 class Factors(Strict):
-    """How a material differs from that of the table."""
+    """Factors on the properties of a material.
+
+    Attributes:
+        permittivity: factor on the relative permittivity.
+        conductivity: factor on the conductivity.
+    """
 
     permittivity: Factor = 1.0
     conductivity: Factor = 1.0
 
 
 class Level(Strict):
-    """What one level changes and adds."""
+    """Changes of one level of severity against the level before it.
+
+    Attributes:
+        objects: that change or are added.
+        moving: movers that change or are added.
+        interferers: that change or are added.
+    """
 
     objects: list[_Change] = []
     moving: list[_Change] = []
@@ -207,7 +292,21 @@ class Level(Strict):
 
 
 class Description(Strict):
-    """A scene file. Needs objects, a building, or both."""
+    """A scene file. It has objects, a building, or both.
+
+    Attributes:
+        name: of the scene; default: that of the file.
+        objects: objects at rest.
+        building: a generated floor of a building.
+        moving: people, doors and fans.
+        levels: changes per level of severity; level 2 of corner.yaml is the scene corner@2.
+        clutter: density of small objects and fittings, 1 as in rooms in use, 0 none. Default: 1 in buildings, else 0.
+        unevenness: deviation of surfaces from planes and right angles, 1 as in real buildings, 0 none. Default: 1 in
+            buildings, else 0.
+        furniture: number of pieces of furniture in a building, as a fraction of the usual number.
+        materials: factors on the properties of materials, by name.
+        interferers: other radars that transmit in the scene.
+    """
 
     name: str = ""
     objects: list[Shape] = []

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from pydantic import Field, field_validator
 from scipy.spatial.transform import Rotation
 
+from radarize.io.schema import Changes
 from radarize.io.yamlfile import changed
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
@@ -39,7 +40,9 @@ class Interferer(Strict):
     """
 
     name: Name
-    radar: RadarConfig = PRESETS["radarize"]
+    radar: Annotated[RadarConfig, Changes(RadarConfig, tuple(PRESETS))] = Field(
+        PRESETS["radarize"], json_schema_extra={"default": "radarize"}
+    )
     position: Vector
     velocity: Vector = (0.0, 0.0, 0.0)
     yaw: Number = 0.0

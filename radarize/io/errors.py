@@ -18,11 +18,17 @@ _LONGEST = 1000
 
 
 class InputError(Exception):
-    """Something the user supplied cannot be used.
+    """Input that cannot be used.
 
-    Its text is one sentence that names the file or field, the value found and what was expected; the command
-    lines print it and exit with code 2. What a file holds may be part of it: it is shown as printable characters, and
-    not at any length.
+    Its text is one sentence with the file or field, the value found and what was expected; the command lines print it
+    and exit with code 2. Content of a file is shown as printable characters, and shortened.
+
+    Example:
+        >>> try:
+        ...     rz.load("nowhere.h5")
+        ... except rz.InputError as error:
+        ...     print(error)
+        nowhere.h5: no such file, expected a recording (.h5)
     """
 
     def __str__(self) -> str:

@@ -1,5 +1,9 @@
-"""Radar odometry. ``radarize.odometry(recording)`` estimates it, see `radarize.estimate_odometry`; the modules here are
-what it is made of.
+"""Radar odometry: ``radarize.odometry(recording)`` is `radarize.estimate_odometry`; the modules here are its parts.
+
+Example:
+    >>> odometry = rz.odometry(rec, method="doppler")
+    >>> len(odometry), odometry.velocity.shape  # m/s
+    (24, (24, 2))
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""`import radarize as rz`: what it offers, what that is called, and the examples of its docstrings."""
+"""Public names of `radarize` and `radarsim`, and the examples in their docstrings."""
 
 import ast
 import doctest
@@ -14,25 +14,27 @@ import radarize as rz
 import radarsim
 
 ROOT = Path(__file__).parents[2]
-#: What is called, by the name that it has in docstrings.
-PUBLIC = {name: getattr(rz, name) for name in rz._HOMES if name not in ("InputError", "Recording", "Trajectory")}
-PUBLIC["simulate"] = radarsim.simulate
+#: Public names with what they stand for.
+PUBLIC = {
+    name: getattr(package, name) for package in (rz, radarsim) for name in package.__all__ if name != "__version__"
+}
+FUNCTIONS = [name for name, each in PUBLIC.items() if inspect.isfunction(each)]
 
 
 @pytest.mark.parametrize("name", PUBLIC)
 def test_examples(name, walk, rec, monkeypatch):
-    """Of every public function; a class may have its example where it is made."""
+    """Every public name has an example that runs."""
     monkeypatch.chdir(walk.parent)
     names = {"rz": rz, "radarsim": radarsim, "rec": rec}
     found = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=names)
     examples = [each for each in found if each.examples]
-    assert examples or inspect.isclass(PUBLIC[name])
+    assert examples
     said: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert not sum(runner.run(each, out=said.append).failed for each in examples), "".join(said)
 
 
-@pytest.mark.parametrize("name", [name for name, each in PUBLIC.items() if not inspect.isclass(each)])
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_docstrings_say_what_comes_out_and_what_goes_wrong(name):
     text = inspect.getdoc(PUBLIC[name])
     assert all(f"\n{part}:\n" in text for part in ("Args", "Returns", "Raises", "Example"))

@@ -47,6 +47,12 @@ class Calibration:
         values: further quantities by name, SI units; NaN with the reason where they are not observable.
         warnings: what makes the estimate poor.
         source: what it was made from, a sentence.
+
+    Example:
+        >>> import numpy as np
+        >>> found = rz.Calibration(rec.config, np.zeros((3, 4, 2)), {}, [], "nominal values")
+        >>> found.board.name, found.gains.shape, found.phases.shape  # dB, rad
+        ('iwr1843boost', (3, 4), (3, 4))
     """
 
     config: RadarConfig

@@ -72,7 +72,7 @@ def train(
 @app.command()
 def benchmark(
     name: Annotated[str, typer.Argument(metavar="NAME", help="list, all, or a benchmark of the list.")],
-    data: Annotated[Path | None, typer.Option(help="Folder of recordings, see `radarsim dataset`.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Folder of recordings, or of bags.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder to write; goes on where it was left.")] = None,
     methods: Annotated[
         list[str] | None,

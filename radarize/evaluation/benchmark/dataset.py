@@ -76,7 +76,7 @@ class DataSet:
         folder = Path(folder)
         paths = sorted(folder.glob("*.h5")) or sorted(folder.glob("*/*.h5"))
         if not paths:
-            raise InputError(f"{folder}: holds no recordings, expected *.h5")
+            raise InputError(f"{folder}: holds no recordings, expected *.h5, or bags such as cart_csl_upper_0.bag")
         return cls(
             folder,
             tuple(Case.of(path, str(path.relative_to(folder).with_suffix(""))) for path in paths),

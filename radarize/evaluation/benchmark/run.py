@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib import pyplot
 
+from radarize.evaluation.benchmark.archive import bags, import_archive
 from radarize.evaluation.benchmark.dataset import DataSet
 from radarize.evaluation.benchmark.results import Results, machine
 from radarize.evaluation.benchmark.study import BENCHMARKS, Benchmark, Options, Study, carry_out
@@ -31,7 +32,7 @@ def benchmark(
 
     Args:
         name: a key of `BENCHMARKS`, or ``all``.
-        data: folder of recordings.
+        data: folder of recordings, or of the Radarize data set's bags, which are imported to `output`/recordings.
         output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark (NAME.png where it has curves),
             index.html over all; ``runs``, ``timings`` and ``weights``, which are used again.
         options: what is compared, and with what.
@@ -49,7 +50,10 @@ def benchmark(
         raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*known, ALL))}")
     options.check()
     machine()  # as things are now: sources may change while it runs
-    found, output = DataSet.load(data), Path(output)
+    output = Path(output)
+    if bags(Path(data)):
+        data = import_archive(Path(data), output / "recordings", progress)
+    found = DataSet.load(data)
     studies: dict[str, Study] = {}
     for each in known if name == ALL else (name,):
         try:

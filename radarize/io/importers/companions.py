@@ -18,6 +18,7 @@ from radarize.io.pixels import read_picture
 from radarize.io.pose import OPTICAL_TURN
 from radarize.io.recording import Product, Stream
 from radarize.radar.config import RadarConfig
+from radarize.signal.depthlabel import LABEL, label_streams, occupancy
 from radarize.signal.points import COLUMNS
 
 #: s: header stamps that are further from the time of receipt are not of the same clock.
@@ -163,7 +164,10 @@ def _interpolated(known: list[tuple[float, np.ndarray]], at: Float[np.ndarray, "
 
 
 class Depth(Companion):
-    """Depth pictures, the nearest to the middle of each burst; all 0 where none is nearer than half a frame."""
+    """Depth pictures, the nearest to the middle of each burst; all 0 where none is nearer than half a frame.
+
+    Where the lens is known, the occupancy label of each picture comes with it.
+    """
 
     def __init__(self, config: RadarConfig, first: Message):
         super().__init__(config, first)
@@ -179,7 +183,10 @@ class Depth(Companion):
     def calibrate(self, pinhole: tuple[float, float, float, float]) -> None:
         """Set fx, fy, cx, cy (pixels)."""
         about = "fx fy cx cy of the depth camera"
-        self.products = {"truth/depth_intrinsics": Product(np.asarray(pinhole, float), "pixels", about)}
+        self._pinhole = np.asarray(pinhole, float)
+        label, axes = label_streams(self.config)
+        self.streams = {"truth/depth": self.streams["truth/depth"], **label}
+        self.products = {"truth/depth_intrinsics": Product(self._pinhole, "pixels", about), **axes}
 
     def read(self, message: Message) -> tuple:
         """The picture as it came: unpacked only if a frame wants it."""
@@ -201,7 +208,8 @@ class Depth(Companion):
                 else:
                     pictures[index] = picture
         self._until(end - self.config.frame_period)
-        return {"truth/depth": pictures}
+        label = {LABEL: occupancy(pictures, self._pinhole, self.config)} if LABEL in self.streams else {}
+        return {"truth/depth": pictures, **label}
 
 
 def depth_picture(message: Message) -> UInt16[np.ndarray, "row column"]:

@@ -5,9 +5,7 @@ from jaxtyping import UInt8
 
 from radarize.learning.features.grid import MapGrid
 from radarize.learning.features.table import Reading
-
-#: States of a cell of the occupancy label (`/truth/occupancy` says so).
-FREE, SURFACE, UNKNOWN = 0, 1, 2
+from radarize.signal.depthlabel import SURFACE, UNKNOWN
 
 
 def on_grid(

@@ -5,8 +5,8 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.nn.functional import softplus
 
-from radarize.learning.features.occupancy import FREE, SURFACE
 from radarize.learning.nets.gaussian import Gaussian
+from radarize.signal.depthlabel import FREE, SURFACE
 
 #: See `Gaussian.negative_log_likelihood`.
 BETA = 0.5

@@ -8,13 +8,14 @@ from torch import Generator, Tensor, nn
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from radarize.learning.features import augment
-from radarize.learning.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
+from radarize.learning.features.occupancy import OCCUPANCY
 from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.segmentation import SegmentationNet
 from radarize.learning.nets.weights import Network
 from radarize.learning.task import Motion, Settings, Task, first_cell, turns
+from radarize.signal.depthlabel import SURFACE, UNKNOWN
 from radarize.signal.maps import Maps
 
 

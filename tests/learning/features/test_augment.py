@@ -5,9 +5,9 @@ import pytest
 import torch
 
 from radarize.learning.features import augment
-from radarize.learning.features.occupancy import FREE, SURFACE, UNKNOWN
 from radarize.learning.task import find_task
 from radarize.signal.bearings import BEARINGS
+from radarize.signal.depthlabel import FREE, SURFACE, UNKNOWN
 from radarize.signal.maps import AZIMUTHS, FLOOR
 from tests.learning.training.ridges import CONFIG, ridge, walls
 

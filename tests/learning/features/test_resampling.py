@@ -5,8 +5,9 @@ import pytest
 import torch
 
 from radarize.learning.features.grid import MapGrid, Resampling
-from radarize.learning.features.occupancy import FREE, SURFACE, UNKNOWN, on_grid
+from radarize.learning.features.occupancy import on_grid
 from radarize.radar.presets import PRESETS
+from radarize.signal.depthlabel import FREE, SURFACE, UNKNOWN
 from radarize.signal.maps import AZIMUTHS, MAPS, MapMaker
 from tests.echoes import record
 

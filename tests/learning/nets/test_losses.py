@@ -5,9 +5,9 @@ import math
 import pytest
 import torch
 
-from radarize.learning.features.occupancy import FREE, SURFACE, UNKNOWN
 from radarize.learning.nets.gaussian import Gaussian
 from radarize.learning.nets.losses import cyclic, surfaces
+from radarize.signal.depthlabel import FREE, SURFACE, UNKNOWN
 
 
 def test_cyclic():

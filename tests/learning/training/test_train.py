@@ -16,13 +16,14 @@ from radarize.cli import app
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.learning.features.grid import MapGrid, Resampling
-from radarize.learning.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
+from radarize.learning.features.occupancy import OCCUPANCY
 from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.weights import header_of, load, read
 from radarize.learning.task import find_task
 from radarize.learning.training.team import Team
 from radarize.learning.training.train import TrainOptions, train
+from radarize.signal.depthlabel import SURFACE, UNKNOWN
 from tests.learning.training.ridges import CONFIG, data_set, write
 
 pytestmark = pytest.mark.usefixtures("one_thread")

@@ -4,12 +4,12 @@
 without plug-ins.
 """
 
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import BaseModel
 
 from radarize.io.errors import InputError
-from radarize.io.schema import Changes, json_schema
+from radarize.io.schema import json_schema
 from radarize.radar.boards import Board
 from radarsim.dataset.specification import Specification
 from radarsim.receiver.frontend_config import FrontEndConfig
@@ -24,7 +24,7 @@ class BoardFile(Board):
     """A board's file; its name is the board's."""
 
     name: str = ""
-    front_end: Annotated[dict[str, Any], Changes(FrontEndConfig)]
+    front_end: FrontEndConfig  # type: ignore[assignment]
 
 
 def schema(name: str) -> dict[str, Any]:

@@ -16,9 +16,9 @@ REC.h5 -o RUN --config mine.yaml` reads such a file; it needs to have only what 
 prints the JSON schema, by which an editor completes and checks the file: write `# yaml-language-server:
 $schema=configuration.json` into its first line.
 
-The unit 1 is that of a number without unit. Tuned on: recordings on which the default was chosen. Names in capitals are
-sets of [choices.yaml](../../radarize/evaluation/benchmark/choices.yaml). A default without an entry there was not tuned
-on recordings: it follows from the hardware, the geometry or the cited method.
+A number without a unit has the unit 1. The last column has the recordings on which the default was chosen; names in
+capitals are sets of [choices.yaml](../../radarize/evaluation/benchmark/choices.yaml). It is empty where no such set is
+recorded. The back end has three presets; the pipeline uses `radar`.
 """
 
 

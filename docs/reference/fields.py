@@ -7,6 +7,9 @@ from typing import Any
 from docs.reference.markdown import code, plain, table
 from radarsim.dataset import randomise, specification
 from radarsim.world import description
+from radarsim.world.materials import MATERIALS
+
+_MATERIAL = "[material](#materials)"
 
 _HEADS = {
     "scene": ("Scene files", description.__doc__),
@@ -36,10 +39,12 @@ def page(name: str, schema: dict[str, Any]) -> str:
     """Return the page of a kind of file: a table of fields for it and for every kind of entry."""
     title, about = _HEADS[name]
     found = [f"# {title}\n", plain(about or "").strip() + "\n", "## In an editor\n", _EDITOR.format(name=name)]
-    found += ["## Fields\n", _fields(schema)]
+    found += ["## Fields\n", _fields(schema, "the board's" if name == "front-end" else "")]
     kinds = dict(_kinds(schema, schema.get("$defs", {})))
-    for kind, each in kinds.items():
-        found += [f"### {kind}\n", plain(each.get("description", "")) + "\n", _fields(each)]
+    for entry, each in kinds.items():
+        found += [f"### {entry}\n", plain(each.get("description", "")) + "\n", _fields(each)]
+    if _MATERIAL in "".join(found):
+        found += ["### Materials\n", ", ".join(map(code, sorted(MATERIALS))) + ".\n"]
     return "\n".join(found)
 
 
@@ -70,18 +75,22 @@ def _inner(schema: Any) -> Iterator[dict[str, Any]]:
             yield from _inner(value)
 
 
-def _fields(schema: dict[str, Any]) -> str:
+def _fields(schema: dict[str, Any], missing: str = "") -> str:
     needed = schema.get("required", ())
     rows = []
     for name, field in schema.get("properties", {}).items():
-        default = "required" if name in needed else code(json.dumps(field["default"])) if "default" in field else ""
+        default = (
+            "required" if name in needed else code(json.dumps(field["default"])) if "default" in field else missing
+        )
         rows.append((code(name), kind(field), default, plain(field.get("description", ""))))
     return table(("field", "type", "default", "what it is"), rows) if rows else ""
 
 
 def kind(field: dict[str, Any]) -> str:
     """Return the type of a field in words, with its limits."""
-    for key in ("anyOf", "oneOf"):
+    if field.get("anyOf", [{}])[0].get("enum") == sorted(MATERIALS):
+        return _MATERIAL
+    for key in ("anyOf", "oneOf", "allOf"):
         if key in field:
             return " or ".join(dict.fromkeys(kind(each) for each in field[key]))
     if "$ref" in field or {"properties", "title"} <= field.keys():

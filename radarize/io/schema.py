@@ -61,6 +61,11 @@ def attributes(model: type) -> dict[str, str]:
     return found
 
 
+def inline(model: type[Described], handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    """Return the JSON schema of a model within that of another field."""
+    return dict(handler.resolve_ref_schema(model.__get_pydantic_json_schema__(model.__pydantic_core_schema__, handler)))
+
+
 @dataclass(frozen=True)
 class Changes:
     """Annotation of a field that takes some of a model's fields, or one of some names.
@@ -70,10 +75,9 @@ class Changes:
         names: that stand for all fields.
     """
 
-    model: type[BaseModel]
+    model: type[Described]
     names: tuple[str, ...] = ()
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        whole = handler(self.model.__pydantic_core_schema__)
-        fields = {key: value for key, value in handler.resolve_ref_schema(whole).items() if key != "required"}
-        return {"anyOf": [{"enum": [*self.names]}, fields]} if self.names else fields
+        fields = {key: value for key, value in inline(self.model, handler).items() if key != "required"}
+        return {"anyOf": [{"enum": [*self.names]}, fields]} if self.names else {"allOf": [fields]}

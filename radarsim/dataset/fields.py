@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
+from radarize.io.schema import inline
 from radarsim.world.description import description_model
 from radarsim.world.generators.buildings import Building, Office
 
@@ -18,10 +19,7 @@ class Place:
     """A scene, or a generated building with fields of its scene file."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        def fields(model: Any) -> dict[str, Any]:
-            return dict(handler.resolve_ref_schema(handler(model.__pydantic_core_schema__)))
-
-        scene = fields(description_model())["properties"]
+        scene = inline(description_model(), handler)["properties"]
         seeds = {
             "description": "first and last seed of several buildings, which are called NAME and the seed",
             "type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 2, "maxItems": 2,
@@ -29,7 +27,7 @@ class Place:
         own = {name: scene[name] for name in OF_SCENE} | {"seeds": seeds}
         kinds = [
             each | {"properties": each["properties"] | own, "required": ["kind"]}
-            for each in map(fields, (Building, Office))
+            for each in (inline(Building, handler), inline(Office, handler))
         ]
         return {"anyOf": [{"type": "string"}, *kinds]}
 

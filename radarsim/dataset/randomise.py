@@ -123,7 +123,7 @@ class Distribution:
             }
             for kind, numbers in lists.items()
         ]  # fmt: skip
-        return {"anyOf": [number, *named]}
+        return {"description": f"A number, which is a constant, or one of {_KINDS}.", "anyOf": [number, *named]}
 
     def __str__(self) -> str:
         numbers = ", ".join(f"{number:g}" for number in self.numbers)
@@ -137,11 +137,12 @@ class Randomise(Frozen):
     """Distributions by field; None: not drawn.
 
     Attributes:
-        clutter, unevenness: as in a scene file, in place of what the scene has.
-        furniture: number of pieces of furniture in a building, as a share of the usual.
-        permittivity, conductivity: factors of a material's, drawn for each material.
-        height: of the sensor above the floor, m.
-        pitch, roll: of the sensor on its platform, degrees; pitch positive: nose down.
+        clutter, unevenness: value in place of that of the scene file.
+        furniture: number of pieces of furniture in a building, as a fraction of the usual number.
+        permittivity, conductivity: factor on that of a material, drawn for each material.
+        height: height of the sensor above the floor, m.
+        pitch: pitch of the sensor on its platform, positive nose down, degrees.
+        roll: roll of the sensor on its platform, degrees.
     """
 
     clutter: Drawn = None

@@ -66,16 +66,16 @@ class Recordings(Frozen):
     """Some recordings of one building.
 
     Attributes:
-        building: a name of `Specification.buildings`, or a pattern that some of them match (`fnmatch`).
-        floors: used in turn; none for buildings without floors.
-        platform: one, or several with `count` recordings each.
-        count: recordings per platform.
-        duration: s, each.
-        waypoints: to go through instead of a tour, m.
-        people: pedestrians near the radar's path in each.
-        variants: some of `Specification.variants`; all if none is named.
-        by_turns: one of the variants for each building that matches, in turn, instead of all of them.
-        attributes: of the recordings.
+        building: name in `buildings`, or a pattern of several names (* and ?).
+        floors: floors that the recordings use in turn; none for buildings without floors.
+        platform: platform, or several with `count` recordings each.
+        count: number of recordings per platform.
+        duration: length of each recording, s.
+        waypoints: way-points x, y instead of a planned tour, m.
+        people: number of pedestrians near the radar's path.
+        variants: names in `variants`; default: all.
+        by_turns: use one variant per matching building, in turn, instead of all.
+        attributes: attributes of the files.
     """
 
     building: Annotated[str, Field(pattern=r"^[A-Za-z0-9*?!\[\]-]+$")]
@@ -107,18 +107,18 @@ class Specification(Frozen):
     """A data set's specification; see the head of this file.
 
     Attributes:
-        name: of the data set.
-        seed: of all recordings.
-        buildings: by name: a generated building, a scene of the project, or a scene file beside this one.
+        name: name of the data set.
+        seed: seed of all recordings.
+        buildings: buildings by name: a generated building, a scene of the project, or a scene file beside this one.
         recordings: groups of recordings.
         radar: preset or .cfg file.
         frontend: front-end file as `radarsim calibrate` writes it; default: the board's.
-        sensors: recorded beside the radar: some sensors, all or none.
+        sensors: sensors that are simulated beside the radar: names, all or none.
         storage: raw samples, or heat maps without samples for training.
-        variants: of every recording, by name, with the same seed and trajectory.
-        attributes: of the files.
+        variants: variants of every recording by name; seed and trajectory are the same in each.
+        attributes: attributes of the files.
         randomise: distributions of what differs between recordings; default: that of real rooms; {}: nothing.
-        splits: into training, validation and test, by name.
+        splits: splits into training, validation and test recordings, by name.
     """
 
     name: Name

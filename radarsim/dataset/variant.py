@@ -18,14 +18,14 @@ Attributes = dict[str, str | float | int | bool]
 
 
 class Variant(Frozen):
-    """Changes against what the specification says.
+    """Changes of a recording against the specification.
 
     Attributes:
-        level: of a scene that has levels (`radarsim.world.description`); the walk is planned in its level 0.
+        level: level of the scene (`radarsim.world.description`); the trajectory is planned in its level 0.
         radar: fields of `RadarConfig` to change, or a preset in place of the radar.
         frontend: fields of `FrontEndConfig` to change; of its parts, those given.
-        mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
-        attributes: of the recordings.
+        mounting: mounting of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
+        attributes: attributes of the files.
     """
 
     level: int = Field(0, ge=0)

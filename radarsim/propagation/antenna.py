@@ -16,7 +16,7 @@ class Cut(Frozen):
 
     Attributes:
         degrees: angle from boresight, either side, ascending from 0 to 90.
-        loss_db: there, dB below the peak.
+        loss_db: loss at the angles below the peak, dB.
     """
 
     degrees: tuple[float, ...]

@@ -77,13 +77,13 @@ class Custom(Strict):
 
     Attributes:
         permittivity: relative permittivity.
-        conductivity: S/m.
+        conductivity: conductivity, S/m.
         conductor: a perfect conductor; permittivity and conductivity are not used.
         roughness: RMS height of the surface, m.
         sigma0_db: four times the fraction of incident power that is scattered diffusely, dB.
         directive: fraction of the diffuse power in a lobe around the specular direction.
         backscatter: fraction of the diffuse power in a lobe back to the source.
-        thickness: of a slab, through which part of the wave is transmitted, m; null: opaque.
+        thickness: thickness of a slab, through which part of the wave is transmitted, m; null: opaque.
         clear: transparent to light, for the depth camera.
     """
 
@@ -120,7 +120,7 @@ class Shape(Strict, ABC):
     """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there.
 
     Attributes:
-        name: of the object.
+        name: unique name of the object.
         shape: kind of object.
         material: name of a material, or {custom: {...}}.
         position: x, y, z of the centre, m.
@@ -163,7 +163,7 @@ class Box(TurnedShape):
     """A box.
 
     Attributes:
-        size: along x, y, z before rotation, m.
+        size: extent along x, y, z before rotation, m.
     """
 
     shape: Literal["box"]
@@ -195,9 +195,9 @@ class Cylinder(TurnedShape):
     """A cylinder along z before rotation.
 
     Attributes:
-        radius: m.
-        height: m.
-        sides: facets of its mesh.
+        radius: radius, m.
+        height: height, m.
+        sides: number of facets of its mesh.
     """
 
     shape: Literal["cylinder"]
@@ -213,8 +213,8 @@ class Sphere(Shape):
     """A sphere.
 
     Attributes:
-        radius: m.
-        subdivisions: of the icosahedron of its mesh; each has four times as many triangles.
+        radius: radius, m.
+        subdivisions: subdivisions of the icosahedron of its mesh; each multiplies the triangles by four.
     """
 
     shape: Literal["sphere"]
@@ -229,7 +229,7 @@ class Mesh(TurnedShape):
     """A mesh from a file.
 
     Attributes:
-        file: .ply, .obj or .stl, relative to the scene file.
+        file: mesh file (.ply, .obj, .stl), relative to the scene file.
         scale: factor on its coordinates.
     """
 
@@ -253,11 +253,11 @@ class Mesh(TurnedShape):
         return self._placed(shapes.mesh(self.scale * vertices, faces))
 
 
-class _Change(Described):
+class Change(Described):
     """Fields of the entry of that name that change, or a new entry.
 
     Attributes:
-        name: of an entry; * and ? are wildcards.
+        name: name of an entry; * and ? are wildcards.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True)
@@ -281,21 +281,21 @@ class Level(Strict):
     """Changes of one level of severity against the level before it.
 
     Attributes:
-        objects: that change or are added.
+        objects: objects that change or are added.
         moving: movers that change or are added.
-        interferers: that change or are added.
+        interferers: radars that change or are added.
     """
 
-    objects: list[_Change] = []
-    moving: list[_Change] = []
-    interferers: list[_Change] = []
+    objects: list[Change] = []
+    moving: list[Change] = []
+    interferers: list[Change] = []
 
 
 class Description(Strict):
     """A scene file. It has objects, a building, or both.
 
     Attributes:
-        name: of the scene; default: that of the file.
+        name: name of the scene; default: that of the file.
         objects: objects at rest.
         building: a generated floor of a building.
         moving: people, doors and fans.

@@ -30,13 +30,13 @@ class Interferer(Strict):
     """A radar that sends by itself: antennas and power of the board are those of the radar that it disturbs.
 
     Attributes:
-        name: of its own.
-        radar: a preset's name, or the fields of `RadarConfig` in which it differs from the preset `radarize`.
-        position: at time 0 of the motion, m.
-        velocity: m/s.
-        yaw: of its boresight, degrees.
-        start: when its first frame begins, s; it is silent before, and sends frame after frame from then on.
-        clock_ppm: by how much its clock is faster than that of the radar that it disturbs.
+        name: unique name of the radar.
+        radar: name of a preset, or the fields of `RadarConfig` in which it differs from the preset `radarize`.
+        position: x, y, z at time 0 of the motion, m.
+        velocity: velocity, m/s.
+        yaw: direction of its boresight, degrees.
+        start: start of its first frame, s; from then on it transmits frame after frame.
+        clock_ppm: frequency offset of its clock to that of the disturbed radar, ppm.
     """
 
     name: Name

@@ -81,8 +81,8 @@ class Mover(Strict, ABC):
     Parts of no material share the mover's `cross_section`, m^2; where it has none, they hide and do not echo.
 
     Attributes:
-        name: of the mover.
-        kind: of mover.
+        name: unique name of the mover.
+        kind: type of mover.
     """
 
     name: Name
@@ -106,8 +106,8 @@ class Person(Mover):
     Attributes:
         cross_section: radar cross section of the whole body, m^2.
         path: way-points x, y of the polyline, m; one point: the person stands there.
-        speed: m/s.
-        height: of the body, m.
+        speed: walking speed, m/s.
+        height: height of the body, m.
         floor: z of the floor, m.
     """
 
@@ -196,11 +196,11 @@ class Door(Mover):
 
     Attributes:
         hinge: x, y, z of the hinge at half its height, m.
-        width: of the leaf, m.
-        height: of the leaf, m.
-        thickness: of the leaf, m.
+        width: width of the leaf, m.
+        height: height of the leaf, m.
+        thickness: thickness of the leaf, m.
         angles: first and last angle of the leaf from the x axis, degrees.
-        period: of the swing, s.
+        period: period of the swing, s.
         material: name of the leaf's material.
     """
 
@@ -239,12 +239,12 @@ class Fan(Mover):
 
     Attributes:
         cross_section: radar cross section of all blades, m^2.
-        center: x, y, z, m.
+        center: x, y, z of the centre, m.
         axis: direction of the axis, x, y, z.
-        radius: m.
+        radius: radius, m.
         blades: number of blades.
-        pitch: of the blades, degrees.
-        turns_per_second: 1/s.
+        pitch: pitch of the blades, degrees.
+        turns_per_second: rotations per second.
     """
 
     kind: Literal["fan"] = "fan"

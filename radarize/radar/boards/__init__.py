@@ -30,14 +30,14 @@ Part = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Mounting(Frozen):
-    """Where the sensor sits on its carrier, each value as far as a walk showed it, else None.
+    """Mounting of the sensor on its carrier; None: not observed.
 
     Attributes:
-        height: over the floor, m.
-        lever_arm: ahead of the carrier's axle, m.
-        yaw: of the sensor to the carrier's way ahead, rad, positive to the left.
-        tilt: by how much the front is raised, rad.
-        lean: by how much the left side is raised, rad.
+        height: height above the floor, m.
+        lever_arm: distance ahead of the carrier's axle, m.
+        yaw: yaw to the carrier's forward direction, positive to the left, rad.
+        tilt: angle by which the front is raised, rad.
+        lean: angle by which the left side is raised, rad.
     """
 
     height: float | None = None
@@ -56,18 +56,20 @@ class Board(Frozen):
     """A board.
 
     Attributes:
-        name: of its file, without the suffix.
-        source: the document that describes the layout.
-        chip: a name of `radarize.radar.boards.chips.CHIPS`, whose bands and limits apply.
-        design_frequency: of the antenna spacings, Hz.
-        tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
-        tx_sign, rx_sign: -1 for antennas fed from the opposite side of the patch, whose signal is turned by 180 deg.
-            Default: none are.
-        platforms: other names by which configurations call this very board (``% Platform:``, ``mmWaveDevice``).
-        calibration: measured factor per physical (tx, rx) as (re, im) pairs, to be multiplied onto samples, signs of
+        name: name of the board's file without suffix.
+        source: document that describes the layout.
+        chip: name in `radarize.radar.boards.chips.CHIPS`, which has its bands and limits.
+        design_frequency: frequency of the antenna spacings, Hz.
+        tx: positions of the transmit antennas as (left, up) in half wavelengths at the design frequency.
+        rx: positions of the receive antennas, likewise.
+        tx_sign: -1 for a transmit antenna fed from the opposite side of the patch, which turns its phase by 180 deg.
+            Default: 1 for all.
+        rx_sign: the same for receive antennas.
+        platforms: other names of this board in configurations (``% Platform:``, ``mmWaveDevice``).
+        calibration: measured factor per physical (tx, rx) as (re, im) pairs, by which samples are multiplied, signs of
             the antennas included; None: not measured.
-        range_bias: m, measured ranges less the true ones.
-        mounting: of the sensor; None: not measured. For the reader: nothing is computed from it.
+        range_bias: measured minus true range, m.
+        mounting: mounting of the sensor on its carrier, not used in processing; None: not measured.
         front_end: fields of `radarsim.receiver.frontend_config.FrontEndConfig`, which only the simulator reads.
     """
 

@@ -33,9 +33,9 @@ class Floor(Strict, ABC):
 
     Attributes:
         kind: style of the building.
-        seed: of what all floors share: outline, corridors, stairs.
+        seed: seed of what all floors share: outline, corridors, stairs.
         floor: number of the floor, which varies rooms, doors and furniture.
-        furnished: with furniture.
+        furnished: whether rooms have furniture.
     """
 
     kind: str
@@ -93,8 +93,8 @@ class Office(Floor):
     """A floor of style `office`: a corridor along x between two rows of rooms, of given sizes.
 
     Attributes:
-        length: along x, outside to outside, m.
-        depth: along y, outside to outside, m.
+        length: extent along x, outside to outside, m.
+        depth: extent along y, outside to outside, m.
         height: floor to ceiling, m.
         corridor: width of the corridor, m.
         room: usual width of a room, m.

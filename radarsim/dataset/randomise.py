@@ -1,4 +1,4 @@
-"""What differs at random between the recordings of a data set (`randomise.yaml` is the default).
+"""``randomise`` draws values per recording. The default, ``randomise.yaml``, is the range of real rooms.
 
     randomise:
       clutter: {uniform: [0.7, 1.4]}                  # low, high
@@ -7,10 +7,9 @@
       conductivity: {lognormal: [1, 0.4]}             # median, standard deviation of the logarithm
       height: {handheld: {uniform: [1.0, 1.4]}, cart: 0.95}                # by platform; a number is a constant
 
-Fields that are not named are not drawn: ``randomise: {}`` draws nothing. Normal distributions end at three standard
-deviations. What a building of the data set gives itself (``clutter: 0``), and what a variant's mounting sets, is not
-drawn. A draw is keyed by the recording's seed and the field. It depends on no other field or recording, nor on the
-order in which they are made, and the variants of a recording share it.
+Fields that are not named are not drawn: ``randomise: {}`` draws nothing. Normal distributions are truncated at three
+standard deviations. Fields that a building of the data set sets (``clutter: 0``) or that a variant's mounting sets are
+not drawn. A value depends on the recording's seed and on the field only; variants of a recording share it.
 """
 
 from collections.abc import Collection, Iterator, Mapping

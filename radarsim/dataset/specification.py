@@ -1,4 +1,4 @@
-"""What a data set holds: a YAML file, and the list of recordings it stands for.
+"""A data set is specified by a YAML file, which stands for a list of recordings.
 
     name: two-floors
     seed: 1
@@ -14,21 +14,21 @@
     radar: radarize                    # preset or .cfg file
     frontend: board.yaml               # as `radarsim calibrate` writes it; the board's own by default
     sensors: [depth, imu]              # or all, or none
-    storage: raw                       # or heatmaps: no samples, about a tenth of the size, for training
+    storage: raw                       # or heatmaps: heat maps without samples, for training
     variants:                          # every recording once for each, with the same seed and walk
       plain: {}
       coarse: {radar: {samples: 48}, attributes: {value: 48}}             # see `radarsim.dataset.variant`
-    randomise:                         # drawn for each recording; by default as in real rooms, {}: nothing
+    randomise:                         # drawn per recording; default: the range of real rooms; {}: nothing
       clutter: {uniform: [0.7, 1.4]}                                    # see `radarsim.dataset.randomise`
     splits:
       random: {kind: random, folds: 5}                                  # random-0 ... random-4
       platform: {kind: platform, train: [handheld]}                     # tested on all others
       building: {kind: building, held_out: [A, shop]}                   # building-A, building-shop
 
-A recording is called BUILDING_FLOOR_PLATFORM_NUMBER, and _VARIANT where there are some. Its seed comes from the data
-set's seed and the name without the variant alone, so a recording stays the same whatever else the data set holds and in
-whatever order it is made. Recordings can go through `waypoints` ([[x, y], ...], m) instead of on a tour. `attributes`,
-of the data set, of recordings or of a variant, become attributes of the files.
+The name of a recording is BUILDING_FLOOR_PLATFORM_NUMBER, with _VARIANT where there are variants. Its seed depends only
+on the data set's seed and on the name without the variant: a recording is the same in any order of simulation and with
+any other recordings beside it. ``waypoints`` ([[x, y], ...], m) replace the planned tour. ``attributes`` of the data
+set, of recordings or of a variant become attributes of the files.
 """
 
 import fnmatch

@@ -1,4 +1,4 @@
-"""Scene files: YAML with primitive objects and procedural buildings.
+"""A scene file is YAML: primitive objects, meshes, generated buildings, and objects that move.
 
     name: corner
     objects:
@@ -10,11 +10,11 @@
     moving:
       - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
 
-Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file. An open mesh that is
-the outside of a body says ``solid: true``; otherwise it is a sheet with two sides. `importers` writes such files.
+Lengths are in m, angles in degrees; mesh files are relative to the scene file. An open mesh is a sheet with two sides;
+with ``solid: true`` it is the outside of a body. `radarsim scene import` writes such files from meshes, maps and logs.
 
-A scene can have levels, from mild to severe. The file without them is level 0; each level is laid upon the one before:
-an entry whose name is there already (``*`` and ``?`` stand for others) changes the fields it gives, another is added.
+A scene can have levels, from mild to severe. The file without them is level 0; each level changes the one before it. An
+entry with the name of an existing entry (``*`` and ``?`` are wildcards) changes its fields; any other entry is added.
 
     levels:
       - objects: [{name: wall, material: glass}]                                         # level 1
@@ -22,11 +22,10 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1, the default of buildings,
-as in rooms that are in use; 0, the default of scenes without a building, bare, flat and square. With clutter the scene
-has more objects (`small_objects`). ``furniture`` is the number of pieces in a building's rooms as a share of the usual;
-``materials`` has factors of materials' permittivity and conductivity: ``{wood: {permittivity: 1.1}}``. ``interferers``
-are other radars that send there (`interferers`); levels change and add them, too.
+``clutter`` and ``unevenness`` are the clutter and roughness settings: 1, the default of buildings, is a room in use; 0,
+the default of scenes without a building, is bare, flat and at right angles. Clutter adds small objects to the scene.
+``materials`` has factors on permittivity and conductivity: ``{wood: {permittivity: 1.1}}``. ``interferers`` are other
+radars that transmit in the scene. Levels can change and add interferers, too.
 """
 
 import re

@@ -1,17 +1,16 @@
-"""The recording: one HDF5 file of raw I/Q with its configuration, and whatever truth came along.
+"""A recording is one HDF5 file of raw I/Q with the radar's configuration and, where it is known, the truth.
 
-Layout (one chunk per frame, readable while it grows):
+It has one chunk per frame and can be read while it grows:
 
     /radar          attributes: configuration as JSON, the .cfg text
     /radar/adc      int16 (frame, loop, tx, rx, sample, iq)   absent where only heat maps were kept
     /radar/time     float64 (frame,)                          s, start of the first chirp
     /radar/valid    bool (frame, loop, tx)                    False where samples of the chirp were lost
-    /truth/NAME, /imu/NAME, /tracking/NAME, /points/NAME      optional, attributes `unit`, `about` and `clock`,
-                                                              `labels` where values stand for something
+    /truth/NAME, /imu/NAME, /tracking/NAME, /points/NAME      optional; attributes `unit`, `about`, `clock`, `labels`
 
-`clock` names the data set that says which frame or instant a row belongs to: ``radar/time`` for one row a frame,
-``imu/time`` (s) for a stream at its own rate, ``points/frame`` (frame numbers) for many rows or none a frame. Data sets
-without a clock were written once.
+``clock`` is the data set with the time or the frame number of each row: ``radar/time`` for one row per frame,
+``imu/time`` (s) for a stream at its own rate, ``points/frame`` (frame numbers) for any number of rows per frame. Data
+sets without a clock have no time axis.
 """
 
 from radarize.io.recording.captured import spare

@@ -61,7 +61,7 @@ def test_help_is_instant(name):
      "radarize check", "radarize config", "radarize report", "radarize benchmark", "radarize export", "radarize view",
      "radarsim simulate", "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene",
      "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate",
-     "radarsim doctor"],
+     "radarsim schema", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")

@@ -11,8 +11,9 @@ from docs.reference.markdown import code, docstring, plain, table
 _HEAD = """# Python API
 
 For your own programs. The annotations give the shapes of arrays; units are SI. Input that cannot be used raises
-`radarize.InputError`. [In Python](../python.md) introduces the functions; examples below take `import radarize as rz`,
-and `rec`, an opened recording.
+`radarize.InputError`. [In Python](../python.md) introduces the functions. Examples take `import radarize as rz` and an
+opened recording, `rec`. Of a member's arguments, those in brackets are optional. `radarize.odometry` is another name of
+`radarize.estimate_odometry`.
 """
 #: Beyond the names of `radarize` and `radarsim`: sections of names by where they are defined.
 _SECTIONS = {
@@ -75,6 +76,12 @@ def _arguments(function: Any) -> str:
     return arguments.removeprefix("self, ").removeprefix("self")
 
 
+def _call(function: Any) -> str:
+    """Names of the arguments, with those that need not be given in brackets."""
+    known = [each for name, each in inspect.signature(function).parameters.items() if name not in ("self", "cls")]
+    return f"({', '.join(each.name if each.default is each.empty else f'[{each.name}]' for each in known)})"
+
+
 def _members(of: type) -> Any:
     """Public methods and properties that the class itself defines, with the first line of their docstrings."""
     for name, member in vars(of).items():
@@ -83,5 +90,5 @@ def _members(of: type) -> Any:
         cached = getattr(function, "func", None)
         about = inspect.getdoc(cached) if cached is not None else about
         if not name.startswith("_") and about and not inspect.isclass(function):
-            call = "" if isinstance(function, property) or cached is not None else "()"
+            call = "" if isinstance(function, property) or cached is not None else _call(function)
             yield code(f"{name}{call}"), plain(about.split("\n\n")[0])

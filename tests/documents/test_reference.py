@@ -11,6 +11,11 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from docs.reference.pages import written
+from radarize import cli as radarize
+from radarize.io.console import run
+from radarize.io.errors import InputError
+from radarize.pipeline.config import Configuration
+from radarsim import cli as radarsim
 from radarsim import schema
 
 ROOT = Path(__file__).parents[2]
@@ -84,6 +89,28 @@ def test_a_wrong_key_is_not(name, path):
             inner = inner[step]
         inner["colour"] = "blue"
         assert list(VALIDATORS[name].iter_errors(wrong)), entry
+
+
+def test_commands_print_the_schemas(capsys):
+    for arguments, expected in (
+        (["schema", "scene"], json.loads((SCENES / "schemas" / "scene.json").read_text())),
+        (["schema", "board"], json.loads((SCENES / "schemas" / "board.json").read_text())),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            run(radarsim.app, "radarsim", arguments)
+        assert ended.value.code == 0 and json.loads(capsys.readouterr().out) == expected
+    with pytest.raises(InputError, match="schema is 'castle', expected one of scene, dataset, front-end, board"):
+        schema.schema("castle")
+
+
+def test_the_configuration_has_a_schema(capsys):
+    with pytest.raises(SystemExit):
+        run(radarize.app, "radarize", ["config", "--schema"])
+    validator = Draft202012Validator(json.loads(capsys.readouterr().out))
+    whole = yaml.safe_load(Configuration().text())
+    assert not list(validator.iter_errors(whole)) and not list(validator.iter_errors({"slam": {"grid": {"hit": 0.8}}}))
+    for text in ("fuel: 1", "slam: {grid: {hit: 1.5}}", "scans: {cfar: {windows: 3}}"):
+        assert list(validator.iter_errors(yaml.safe_load(text)))
 
 
 @pytest.mark.parametrize(

@@ -29,9 +29,9 @@ def test_examples(name, walk, rec, monkeypatch):
     found = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=names)
     examples = [each for each in found if each.examples]
     assert examples
-    said: list[str] = []
+    output: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
-    assert not sum(runner.run(each, out=said.append).failed for each in examples), "".join(said)
+    assert not sum(runner.run(each, out=output.append).failed for each in examples), "".join(output)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

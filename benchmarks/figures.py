@@ -25,6 +25,10 @@ METHODS = {
 }
 #: Public lidar logs.
 LOGS = ("intel", "csail", "orebro")
+#: Scans that the page of results shows.
+EXTRACTORS = ("segmentation", "first-echo", "cfar", "radarhd")
+#: Odometry and scans whose run time the page of sizes and times shows.
+RUNS = (("fused", "segmentation"), ("doppler", "first-echo"))
 Row = Mapping[str, Any]
 
 
@@ -49,47 +53,145 @@ def walks() -> str:
     return table(["mean error, m", "handheld", "cart", "robot", "all", "worst walk"], lines)
 
 
+def mean_errors(part: str) -> tuple[str, str]:
+    """Mean ATE of odometry and of SLAM over all walks of a part, m."""
+    mean = next(row for row in rows(part, "by platform and building") if row["on"] == "all")
+    odometry, slam = (float(mean[f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
+    return f"{odometry:.2f} m", f"{slam:.3f} m"
+
+
+def release(part: str) -> str:
+    """Version of this project that a part was made with."""
+    return str(Results.read(PARTS / f"{part}.json").machine["version"])
+
+
+def chamfer(method: str, place: Sequence[int], way: str = "instant_") -> float:
+    """Mean distance of a method's points from the lidar's on some real walks, m."""
+    found = [row for row in rows("real", "real walks") if row["method"] == method and row["walk"] in place]
+    return float(sum(row[f"{way}chamfer_m"] for row in found) / len(place))
+
+
+def readme() -> str:
+    """The five results of README: what, simulated or real, the result, the release, the page."""
+
+    def page(name: str, part: str, *cells: str) -> list[str]:
+        return [*cells, release(part), f"[{name}](benchmarks/results/{name}.md)"]
+
+    radar = [row for row in rows("radars") if str(row["radar"]).startswith("radarize")]
+    without = next(row for row in radar if (row["odometry by"], row["scans"]) == ("doppler", "first-echo"))
+    chosen = next(row for row in radar if row["chosen"])
+    plain, networks = ([str(row[f"{kind} m"]).split()[0] for kind in ("odometry", "SLAM")] for row in (without, chosen))
+    scan = next(row for row in rows("mapping") if row["scans"] == "segmentation" and row["on"] == "all")
+    live = next(row for row in rows("live_speed") if row["odometry, scans"] == "fused, segmentation")
+    (minute, minute_slam), (five, five_slam) = mean_errors("walks"), mean_errors("long_walks")
+    number = sum(1 for _ in rows("walks", "walk by walk"))
+    lines = [
+        page("walks", "walks", f"Mean ATE, {number} walks of 1 min (4 of 5 min)", "simulated",
+             f"odometry {minute} ({five}), SLAM {minute_slam} ({five_slam})"),
+        page("radars", "radars", f"Mean ATE without networks (with), {without['walks']} shorter walks", "simulated",
+             f"odometry {plain[0]} m ({networks[0]} m), SLAM {plain[1]} m ({networks[1]} m)"),
+        page("scans", "mapping", f"Ranges within 10 cm, F1 of the map, {scan['recordings']} walks", "simulated",
+             f"{scan['within 10 cm %']:.0f} %, {scan['map F1 %']:.0f} %"),
+        page("real", "real", "Distance of points from a lidar's, building new to both networks", "**real** pictures",
+             f"{chamfer('network', PLACES[1]):.2f} m; RadarHD {chamfer('RadarHD', PLACES[1]):.2f} m"),
+        page("speed", "live_speed", "Time per frame on 2 cores, frames every 33 ms", "simulated",
+             f"{live['ms a frame']:.0f} ms"),
+    ]  # fmt: skip
+    return table(["what", "data", "result", "release", "page"], lines)
+
+
 def walks_mean() -> str:
     """Of odometry and of SLAM over all walks."""
-    mean = next(row for row in rows("walks", "by platform and building") if row["on"] == "all")
-    odometry, slam = (float(mean[f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
-    return f"{odometry:.2f} and {slam:.3f} m"
+    odometry, slam = mean_errors("walks")
+    return f"{odometry} and {slam}"
 
 
-def paper() -> str:
-    """Odometry by the paper's protocol, beside the paper's figures."""
-    shown = [row for row in rows("odometry") if isinstance(row["paper: ATE m"], float)]
-    lines = [[row["odometry"], f"{row['ATE m']:.2f}", f"{row['paper: ATE m']:.2f}"] for row in shown]
-    return table(["odometry", "ATE, m (simulated)", "in the paper (real)"], lines)
+def long_walks_mean() -> str:
+    """The same over walks of five minutes."""
+    odometry, slam = mean_errors("long_walks")
+    return f"{odometry} and {slam}"
+
+
+def clock_gap() -> str:
+    """Largest difference of the clocks of radar and lidar on real test walks."""
+    gaps = [abs(row[key]) for row in rows("real", "clocks") for key in ("start_s", "end_s") if row[key] is not None]
+    return f"{max(gaps):.1f} s"
+
+
+def live_time() -> str:
+    """Time per followed frame of `radarize live` with networks, and the time between frames."""
+    row = next(row for row in rows("live_speed") if row["odometry, scans"] == "fused, segmentation")
+    return f"{row['ms a frame']:.0f} ms of the {row['budget, ms']:.0f} ms between frames"
+
+
+def live_dropped() -> str:
+    """Frames that `radarize live` dropped in the session of an hour."""
+    notes = " ".join(note for each in Results.read(PARTS / "soak.json").tables for note in each.notes)
+    dropped, frames = map(int, re.search(r"(\d+) of (\d+) frames were dropped", notes).groups())
+    return f"{dropped:,} of {frames:,} frames ({100 * dropped / frames:.1f} %)"
+
+
+def sizes() -> str:
+    """What a minute takes on the disk, and how long it takes to make."""
+    frames, found = 1800, {str(row["what"]): row for row in rows("dataset_speed")}
+    raw, maps = (next(row for what, row in found.items() if what.startswith("2 workers") and what.endswith(kind))
+                 for kind in ("thread, raw", "heatmaps"))  # fmt: skip
+    speed = {row["way"]: row for row in rows("simulator_speed")}
+    one, two = (speed[f"office: {way}"]["ms per frame"] for way in ("radarsim", "a recording by 2 processes"))
+    lines = [
+        ["recording with all sensors, samples", f"{raw['kB per frame'] * frames / 1e3:.0f} MB", "-"],
+        ["the same as heat maps (`storage: heatmaps`)", f"{maps['kB per frame'] * frames / 1e3:.0f} MB", "-"],
+        ["simulating the office, radar alone, 1 process", "-", f"{one * frames / 1e3:.0f} s"],
+        ["simulating the office, radar alone, 2 processes", "-", f"{two * frames / 1e3:.0f} s"],
+        ["data set with all sensors, 2 processes", "-", f"{raw['ms per frame'] * frames / 1e3:.0f} s"],
+        *(
+            [f"`radarize run`, {row['odometry']} and {row['scans']}", "-",
+             f"{row['whole, with reading'] * frames / 1e3:.0f} s"]
+            for row in rows("runtime") if (row["odometry"], row["scans"]) in RUNS
+        ),
+    ]  # fmt: skip
+    return table(["a minute (1,800 frames)", "disk", "time on 2 cores"], lines)
+
+
+def heatmap_share() -> str:
+    """Size of a recording of heat maps as a share of one of samples."""
+    found = {str(row["what"]): row["kB per frame"] for row in rows("dataset_speed")}
+    return f"{100 * found['2 workers x 1 thread, heatmaps'] / found['2 workers x 1 thread, raw']:.0f} %"
+
+
+def simulator() -> str:
+    """Time per frame of the simulator and of Sionna RT on one scene."""
+    speed = {row["way"]: row["ms per frame"] for row in rows("simulator_speed")}
+    ours, theirs = speed["office: radarsim"], speed["office: --engine sionna"] / 1e3
+    return f"{ours:.0f} ms on one core; the paths of Sionna RT take {theirs:.1f} s"
 
 
 def scans() -> str:
-    """Scans and maps by method."""
+    """Scans and maps by method, and at the worst level of the multipath test."""
     head = {"within 10 cm %": 1, "returned %": 1, "ghosts left %": 1, "map F1 %": 1, "SLAM ATE m": 3}
+    worst = {"ghosts, % of returns": 1, "map F1, %": 1, "SLAM ATE, m": 3}
+    severe = {row["scans"]: row for row in rows("multipath") if row["levels"] == "most severe"}
     lines = [
-        [row["scans"], *(f"{row[name]:.{digits}f}" for name, digits in head.items())]
+        [
+            str(row["scans"]),
+            *(f"{row[name]:.{digits}f}" for name, digits in head.items()),
+            *(f"{severe[row['scans']][name]:.{digits}f}" for name, digits in worst.items()),
+        ]
         for row in rows("mapping")
-        if row["on"] == "all"
+        if row["on"] == "all" and row["scans"] in EXTRACTORS
     ]
-    return table(["scans by", *head], lines)
-
-
-def multipath() -> str:
-    """Ranking at the worst step."""
-    head = {"ghosts, % of returns": 1, "missed surfaces, % of bearings": 1, "map F1, %": 1, "SLAM ATE, m": 3}
-    lines = [
-        [row["scans"], *(f"{row[name]:.{digits}f}" for name, digits in head.items())]
-        for row in rows("multipath")
-        if row["levels"] == "most severe"
-    ]
-    return table(["scans by", *head], lines)
+    names = [f"{name[:-2]}, {name[-1]}" if name[-2] == " " else name for name in head]
+    return table(["scans by", *names, *(f"worst level: {name}" for name in worst)], lines)
 
 
 def conditions() -> str:
     """Plain walks, and the conditions under which SLAM errs at least twice as much."""
     times = "times the plain walks'"
     shown = [row for row in rows("conditions") if row["condition"] == "plain" or row[times] >= 2]
-    lines = [[row["condition"], row["odometry m"], row["SLAM m"], f"{row[times]:.1f}"] for row in shown]
+    lines = [
+        [name.replace("phases off by", "phase errors of"), row["odometry m"], row["SLAM m"], f"{row[times]:.1f}"]
+        for name, row in ((str(row["condition"]), row) for row in shown)
+    ]
     return table(["condition", "odometry, m", "SLAM, m", times], lines)
 
 
@@ -106,12 +208,11 @@ def radars() -> str:
 
 def real() -> str:
     """Distances of points on real walks matched by time, and in brackets matched by frame index."""
-    found, lines = rows("real", "real walks"), []
+    lines = []
     for method, words in METHODS.items():
         cells = []
         for place in PLACES:
-            some = [row for row in found if row["method"] == method and row["walk"] in place]
-            by = [sum(row[f"{way}chamfer_m"] for row in some) / len(place) for way in ("instant_", "")]
+            by = [chamfer(method, place, way) for way in ("instant_", "")]
             cells.append(f"{by[0]:.2f} ({by[1]:.2f})")
         lines.append([words, *cells])
     return table(["", "building of RadarHD's training", "another building", "standing still"], lines)
@@ -125,16 +226,18 @@ def realism() -> str:
 
 
 def back_end() -> str:
-    """Lidar logs beside Cartographer."""
+    """ATE on lidar logs, with Cartographer's in brackets."""
     logs = [row for row in rows("slam_backend") if row["case"] in [f"lidar, {log}" for log in LOGS]]
-    lines = [[log, f"{row['ATE m']:.3f} m", row["to beat"].split(",")[0]] for log, row in zip(LOGS, logs, strict=True)]
-    return table(["lidar log", "ATE", "Cartographer's at its best settings"], lines)
+    found = (f"{row['ATE m']:.3f} ({row['to beat'].split(' m')[0]})" for row in logs)
+    return f"{', '.join(found)} m on {', '.join(LOGS)}"
 
 
 #: Figures by name.
 FIGURES: dict[str, Callable[[], str]] = {
-    "walks": walks, "walks-mean": walks_mean, "paper": paper, "scans": scans, "multipath": multipath,
-    "conditions": conditions, "radars": radars, "real": real, "realism": realism, "back-end": back_end,
+    "readme": readme, "walks": walks, "walks-mean": walks_mean, "long-walks-mean": long_walks_mean,
+    "scans": scans, "conditions": conditions, "radars": radars, "real": real,
+    "realism": realism, "back-end": back_end, "clock-gap": clock_gap, "live-time": live_time,
+    "live-dropped": live_dropped, "sizes": sizes, "heatmap-share": heatmap_share, "simulator": simulator,
 }  # fmt: skip
 
 

@@ -25,7 +25,7 @@ WORDS = (
     ("specular candidate", "a mirror, or two, over which a scatterer may be seen", "image theory, Balanis"),
     ("image method, chain", "the radar seen in two or three mirrors one after another", "Allen, Berkley, JASA 1979"),
     ("Fresnel unit, aperture", "sqrt(lambda d (L - d) / 2L); what an opening passes", "Born, Wolf, ch. 8"),
-    ("flash", "the echo of a reflector that faces the radar", "Gordon, IEEE TAP 1975"),
+    ("specular reflection", "the echo of a reflector that faces the radar", "Gordon, IEEE TAP 1975"),
     ("scattering pattern", "how a rough surface shares out its diffuse echo", "Degli-Esposti, IEEE TAP 2007"),
     ("transmission, slab", "what a pane, door or board lets through, and how late", "ITU-R P.2040"),
     ("moving target", "what moves by itself", "Skolnik, Radar Handbook"),
@@ -33,7 +33,7 @@ WORDS = (
     ("sideband", "phase noise beside an echo", "Richards, Fundamentals of Radar Signal Processing"),
 )
 
-#: Sections of the page: what draws and measures, its docstring says the law; and labels of x and y.
+#: Sections of the page: what draws and measures, its docstring is the law; and labels of x and y.
 LAWS = {
     "Point target": (reflectors.point_target, "range, m", LEVEL),
     "Wall": (reflectors.wall_flash, "distance of a concrete wall, m", LEVEL),
@@ -47,12 +47,12 @@ LAWS = {
     ),
     "Smooth surfaces": (reflectors.smooth_surfaces, "along the way", LEVEL),
     "Box room": (rooms.box_room, "path, m", "images up to it"),
-    "Thin pole": (rooms.thin_pole, "offset of the pole, mm", "of the flash without it, dB"),
+    "Thin pole": (rooms.thin_pole, "offset of the pole, mm", "of the reflection without it, dB"),
     "Slab": (rooms.slab, "angle of incidence, deg", "TE coefficient, dB"),
     "Panes": (rooms.panes, "range, m", "over the largest, dB"),
     "Hollow wall": (rooms.hollow_wall, "range, m", "over the front, dB"),
     "Phantom": (rooms.phantom, "azimuth, deg (left positive)", "range, m"),
-    "Moving door": (rooms.moving_door, "angle, deg", "closing speed of the flash, m/s"),
+    "Moving door": (rooms.moving_door, "angle, deg", "closing speed of the reflection, m/s"),
     "Doppler signature": (signals.doppler, "azimuth, deg (left positive)", "closing speed, m/s"),
     "TDM slots": (signals.tdm, "closing speed, m/s", "phase against TX1, deg"),
     "Within a burst": (signals.range_walk, "loop", "range that the beat frequency stands for, m"),
@@ -63,7 +63,7 @@ LAWS = {
     "Speckle under motion": (surfaces.decorrelation, "sideways displacement, mm", "correlation with the field at rest"),
     "Convergence": (surfaces.convergence, "scatterers on 12 m2 of wall", "mean power per cell, dB"),
     "Clutter": (surfaces.small_things, "radar cross section, dBsm", "share below"),
-    "Uneven walls": (surfaces.uneven_walls, "along the wall, mm", "correlation of the flash"),
+    "Uneven walls": (surfaces.uneven_walls, "along the wall, mm", "correlation of the reflection"),
     "Reciprocity": (surfaces.reciprocity, "power of the difference over the field's, dB", ""),
 }
 

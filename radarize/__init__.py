@@ -7,7 +7,7 @@
     run = rz.run(rec)
     print(rz.evaluate(run))
 
-What stands here is loaded at its first use. ``docs/python.md`` shows it.
+What stands here is loaded at its first use. ``docs/howto/python.md`` shows it.
 """
 
 from importlib import import_module

@@ -122,8 +122,8 @@ def test_simulate_run_and_report_anywhere(walked, installed):
 
 
 def test_the_page_on_python_runs_anywhere(walked, installed):
-    """Each block of ``docs/python.md`` is a script, in order, on the walk that is there."""
-    blocks = [block for block in commands("docs/python.md") if block.script]
+    """Each block of ``docs/howto/python.md`` is a script, in order, on the walk that is there."""
+    blocks = [block for block in commands("docs/howto/python.md") if block.script]
     assert len(blocks) == 4
     for block in blocks:
         (walked / "block.py").write_text(block.text)

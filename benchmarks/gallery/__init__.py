@@ -1,4 +1,4 @@
-"""Physical laws: each a function that draws theory and simulation on an axis, and says how far they are apart.
+"""Physical laws: each a function that draws theory and simulation on an axis, and returns their difference in words.
 
-Its docstring says the law. `benchmarks.physics_gallery` makes a page of them.
+Its docstring is the law. `benchmarks.physics_gallery` makes a page of them.
 """

@@ -50,9 +50,9 @@ def point_target(axis) -> str:
     worst = compare(axis, ranges, theory, found)
     far = np.abs(np.array(off))[ranges > 2].max(axis=0)
     return (
-        f"Power: off by {worst:.3f} dB at the worst of 15 ranges. Place, located by a filter for flat wave fronts, at "
-        f"ranges beyond 2 m: off by {far[0]:.3f} mm, {far[1]:.3f} deg in azimuth, {far[2]:.3f} deg in elevation, and "
-        f"{far[3]:.4f} m/s in velocity."
+        f"Power: error of {worst:.3f} dB at the worst of 15 ranges. Place, located by a filter for flat wave fronts, "
+        f"at ranges beyond 2 m: error of {far[0]:.3f} mm, {far[1]:.3f} deg in azimuth, {far[2]:.3f} deg in elevation, "
+        f"and {far[3]:.4f} m/s in velocity."
     )
 
 
@@ -64,7 +64,7 @@ def wall_flash(axis) -> str:
     gamma = abs(what.fresnel(np.array(1.0), CONFIG.center_frequency)[0])
     gamma *= np.exp(-8 * (np.pi * what.roughness / LAMBDA) ** 2)
     theory = 20 * np.log10(LAMBDA * gamma / (8 * np.pi * away))
-    return f"Off by {compare(axis, away, theory, found):.3f} dB at the worst of 13 distances."
+    return f"Error: {compare(axis, away, theory, found):.3f} dB at the worst of 13 distances."
 
 
 def plate(axis) -> str:
@@ -81,7 +81,7 @@ def plate(axis) -> str:
     axis.set(ylim=(theory.max() - 45, None))
     off = np.abs(found - theory)[theory > theory.max() - 30]
     return (
-        f"Where the echo is within 30 dB of its peak: off by {np.median(off):.3f} dB in the median, and by less than "
+        f"Where the echo is within 30 dB of its peak: error of {np.median(off):.3f} dB in the median, and less than "
         f"{np.quantile(off, 0.95):.2f} dB at 95 % of the angles."
     )
 
@@ -101,7 +101,7 @@ def small_mirrors(axis) -> str:
         theory.append(2 * db(straight * abs(kirchhoff_mirror((side / 2, side / 2), place, LAMBDA))))
     worst = compare(axis, sides, np.array(theory), np.array(found))
     return (
-        f"Off by {worst:.1f} dB at the worst of {len(sides)} sizes, because edges farther off than two Fresnel units "
+        f"Error: {worst:.1f} dB at the worst of {len(sides)} sizes, because edges farther off than two Fresnel units "
         "are left out of the sum. Every flat part larger than a squared wavelength echoes and mirrors like this. "
         "Ghosts over two mirrors need mirrors of at least 0.05 m^2."
     )
@@ -134,7 +134,7 @@ def round_and_corners(axis) -> str:
         axis.plot(off, theory, color="black", lw=1)
         axis.plot(off, found, "o", ms=3.5, color=color, label=name)
         worst = max(worst, np.abs(found - theory).max())
-    return f"Off by {worst:.2f} dB at most. That is the sphere: seen from 4 m, its near side is nearer than its centre."
+    return f"Error: {worst:.2f} dB at most. That is the sphere: seen from 4 m, its near side is nearer than its centre."
 
 
 def corner_out_of_square(axis) -> str:
@@ -148,7 +148,7 @@ def corner_out_of_square(axis) -> str:
         search = isotropic((2.0, 0.0, 0.0), LAMBDA, looking((-1.0, 0.0, 0.0)))
         _, _, amplitude = both_ways(wedge(angle), search)  # both paths are equally long
         found.append(db(abs(amplitude.sum() / square) ** 2))
-    return f"Off by {compare(axis, off, theory, found):.2f} dB at most."
+    return f"Error: {compare(axis, off, theory, found):.2f} dB at most."
 
 
 def smooth_surfaces(axis) -> str:
@@ -175,7 +175,7 @@ def smooth_surfaces(axis) -> str:
         axis.plot(along, found, "o", ms=3.5, color=color, label=name)
         worst.append(f"{name} {np.abs(found - theory).max():.1f} dB")
     return (
-        f"Off at most by: {', '.join(worst)}. Three simplifications: borders farther off than three to five Fresnel "
+        f"Error at most: {', '.join(worst)}. Three simplifications: borders farther off than three to five Fresnel "
         "units are left out; a piece of similar curvature has one specular point; where neighbouring triangles meet "
         "at more than 21 deg, there is an edge and no curvature."
     )

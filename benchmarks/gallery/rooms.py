@@ -52,14 +52,14 @@ def box_room(axis) -> str:
 
 
 def thin_pole(axis) -> str:
-    """A wall's flash, 2 m away, while an opaque pole of 1 cm passes half way to the wall. Theory: Kirchhoff's integral,
-    there and back."""
+    """A wall's specular reflection, 2 m away, while an opaque pole of 1 cm passes half way to the wall. Theory:
+    Kirchhoff's integral, there and back."""
     offsets = np.arange(-15, 16) * 0.003
     theory, found = wall_past_pole(offsets)
     compare(axis, 1000 * offsets, theory, found)
     off = (found - theory)[np.abs(offsets) < 0.032]
     return (
-        f"While the pole is in the first Fresnel zone: off by {np.abs(off).max():.1f} dB at worst, {np.std(off):.1f} "
+        f"While the pole is in the first Fresnel zone: error of {np.abs(off).max():.1f} dB at worst, {np.std(off):.1f} "
         "dB RMS. What it diffracts from farther off is left out. The visibility of specular reflections, of edges and "
         "corners of plates, and of chains of mirrors that are 16 dB above the noise is measured like this, by a "
         "lattice of rays. Scatterers have one ray each."
@@ -109,7 +109,7 @@ def hollow_wall(axis) -> str:
     axis.set(ylim=(-45, 3))
     (there, size), (place, level) = peak(truth, 0.07, 0.15), peak(found, 0.07, 0.15)
     return (
-        f"The rear board is off by {1000 * (place - there):+.0f} mm and {level - size:+.1f} dB. Waves that are "
+        f"The rear board has an error of {1000 * (place - there):+.0f} mm and {level - size:+.1f} dB. Waves that are "
         "reflected between the boards more than once are left out, and inner faces mirror nothing else."
     )
 
@@ -129,15 +129,15 @@ def phantom(axis) -> str:
     part = power * near[:, None] * (np.abs(maps.azimuths - np.arctan2(image[1], image[0])) < 0.15)
     r, a = np.unravel_index(np.argmax(part), power.shape)
     return (
-        f"The phantom's peak is off by {1e3 * (maps.ranges[r] - np.linalg.norm(image)):.0f} mm and "
+        f"The phantom's peak has an error of {1e3 * (maps.ranges[r] - np.linalg.norm(image)):.0f} mm and "
         f"{np.rad2deg(maps.azimuths[a] - np.arctan2(image[1], image[0])):.1f} deg; a bin is "
         f"{1e3 * CONFIG.range_resolution:.0f} mm."
     )
 
 
 def moving_door(axis) -> str:
-    """The flash of a turning door comes nearer as fast as the point of the door that is nearest to the radar: by the
-    angular rate times that point's distance from the hinge."""
+    """The specular reflection of a turning door comes nearer as fast as the point of the door that is nearest to the
+    radar: by the angular rate times that point's distance from the hinge."""
     angles = np.arange(78.0, 103.0)
     doors = [swinging(angle) for angle in angles]
     theory, found = [foot_speed(door) for door in doors], []
@@ -147,7 +147,7 @@ def moving_door(axis) -> str:
         found.append((path[0] - path[2]) / (4 * HALF))
     worst = compare(axis, angles, theory, found)
     return (
-        f"Off by {1e3 * worst:.1f} mm/s at most. A moving door flashes, mirrors, lets through and scatters as the "
+        f"Error: {1e3 * worst:.1f} mm/s at most. A moving door reflects, mirrors, lets through and scatters as the "
         "same door at rest does. One simplification: the point where a round body, seen over the door, reflects "
         "stays the same during a burst."
     )

@@ -34,7 +34,9 @@ def tdm(axis) -> str:
         axis.plot(speeds, np.rad2deg(theory[:, k]), color="black", lw=1)
         axis.plot(speeds, np.rad2deg(np.unwrap(found[:, k])), ls="", marker="o", ms=3.5, label=name)
     error = np.rad2deg(np.abs(np.angle(np.exp(1j * (found - theory)))).max())
-    return f"Phases are off by {error:.2f} deg at most. Speeds up to {CONFIG.max_velocity:.3f} m/s are unambiguous."
+    return (
+        f"Phases have an error of {error:.2f} deg at most. Speeds up to {CONFIG.max_velocity:.3f} m/s are unambiguous."
+    )
 
 
 def range_walk(axis) -> str:
@@ -47,7 +49,7 @@ def range_walk(axis) -> str:
     walk = 1e3 * (found[0] - found[-1])
     return (
         f"At 1.6 m/s the echo moves by {walk:.2f} mm; a bin is {1e3 * CONFIG.range_resolution:.1f} mm. The worst "
-        f"chirp is off by {1e3 * worst:.3f} mm. Theory includes range-Doppler coupling."
+        f"chirp has an error of {1e3 * worst:.3f} mm. Theory includes range-Doppler coupling."
     )
 
 
@@ -62,7 +64,7 @@ def noise(axis) -> str:
         watts = np.mean(np.abs(counts) ** 2) / front.counts**2
         found.append(watts / (BOLTZMANN * ROOM_TEMPERATURE * CONFIG.sample_rate))
     worst = compare(axis, gains, db(noise_factor(gains)), db(np.array(found)))
-    return f"Off by {worst:.3f} dB at the worst of {len(gains)} gains."
+    return f"Error: {worst:.3f} dB at the worst of {len(gains)} gains."
 
 
 def phase_noise(axis) -> str:
@@ -77,7 +79,7 @@ def phase_noise(axis) -> str:
         axis.plot(bins, db(found), ".", ms=4, color=color, label=label)
         worst = max(worst, abs(db(found[far].mean() / theory[far].mean())))
     axis.set(ylim=(-150, -98))
-    return f"The mean level of a skirt is off by {worst:.2f} dB at most."
+    return f"The mean level of a skirt has an error of {worst:.2f} dB at most."
 
 
 def interference(axis) -> str:
@@ -92,6 +94,6 @@ def interference(axis) -> str:
     worst = np.abs(found - product).max() / np.abs(product).max()
     return (
         "Theory multiplies both waveforms in steps of 0.1 ns and filters the product; the simulator uses Fresnel "
-        "integrals. The other radar is 4 m away, its slope 2 MHz/us less. The worst sample is off by "
+        "integrals. The other radar is 4 m away, its slope 2 MHz/us less. The worst sample has an error of "
         f"{100 * worst:.3f} % of the peak. Only the straight path counts, and what stands in its way."
     )

@@ -96,7 +96,7 @@ def small_things(axis) -> str:
 
 
 def uneven_walls(axis) -> str:
-    """Along an uneven wall, the flash is correlated as the phases of the wall's points are:
+    """Along an uneven wall, the specular reflection is correlated as the phases of the wall's points are:
     exp(-(2k)^2 (<z z> - <z z'>))."""
     wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (6, 6), (1, 0, 0)), material("plasterboard"))
     steps, level, walls = np.append(np.geomspace(2e-3, 0.3, 16), 10.0), 0.25, 300
@@ -113,9 +113,10 @@ def uneven_walls(axis) -> str:
     axis.set_xscale("log")
     worst = compare(axis, 1e3 * steps[:-1], theory[:-1], found[:-1])
     return (
-        f"The correlation is off by {worst:.3f} at most, over {walls} walls of a quarter of the usual unevenness, 2 m "
-        f"away. The mean power of the flash is {np.mean(np.abs(factors) ** 2):.2f} of a flat wall's: unevenness makes "
-        "a flash fade now and then, but not fainter on average."
+        f"The correlation has an error of {worst:.3f} at most, over {walls} walls of a quarter of the usual "
+        "unevenness, 2 m away. The mean power of the specular reflection is "
+        f"{np.mean(np.abs(factors) ** 2):.2f} of a flat wall's: unevenness makes it fade now and then, but not fainter "
+        "on average."
     )
 
 

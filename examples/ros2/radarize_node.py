@@ -5,7 +5,7 @@
 
 Parameters: `config` (a preset or a .cfg) and `port` of a radar, or `replay` (a recording); `odometry` and `scans`
 (methods; those of choice for the radar if empty). It is a file rather than a package, for rclpy comes with ROS and not
-with pip: install radarize into the Python that ROS uses, and see docs/ros2.md.
+with pip: install radarize into the Python that ROS uses, and see docs/howto/ros2.md.
 """
 
 import math

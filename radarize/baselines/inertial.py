@@ -1,7 +1,7 @@
 """What odometry by a network has in common that reads an IMU."""
 
 from radarize.learning.nets.weights import Network, load
-from radarize.odometry.displacements import Displacements
+from radarize.odometry.displacements import DisplacementIntegrator
 from radarize.odometry.inertial import Imu
 from radarize.pipeline.method import Inputs
 
@@ -26,4 +26,4 @@ class InertialOdometry:
         kind = self.network.kind
         self.imu = Imu.of(inputs.imu(kind))
         self.net, self.header = load(inputs.weights.of(kind), self.network)
-        self.path = Displacements(self.lasts, inputs.radar.frame_period)
+        self.path = DisplacementIntegrator(self.lasts, inputs.radar.frame_period)

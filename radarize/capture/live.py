@@ -24,9 +24,9 @@ from radarize.pipeline.pipeline import Result
 from radarize.pipeline.runfolder import OccupancyMap
 from radarize.signal.batch import Preprocessor
 from radarize.signal.bearings import BEARINGS
-from radarize.slam.drawing import Drawing
 from radarize.slam.node import Node
-from radarize.slam.rehearsal import rehearse
+from radarize.slam.rendering import MapRenderer
+from radarize.slam.warmup import warm_up
 
 if TYPE_CHECKING:
     from radarize.evaluation.foxglove import Server
@@ -66,7 +66,7 @@ class Live:
         self._keeper: Keeper | None = None
         self.busy = 0.0
         self._frame_due = self._map_due = self._stamp = 0.0
-        self._drawing = Drawing(inputs.configuration.slam.grid, _PAUSE)
+        self._drawing = MapRenderer(inputs.configuration.slam.grid, _PAUSE)
         self._painter = ThreadPoolExecutor(1, thread_name_prefix="map")
         self._drawn: Future[None] = Future()
         self._drawn.set_result(None)
@@ -160,7 +160,7 @@ class Live:
 
     def _paint(self, nodes: list[Node], poses: Float[np.ndarray, "node 3"], loops: int, stamp: float) -> None:
         start = time.monotonic()
-        grid = self._drawing.of(nodes, poses)
+        grid = self._drawing.render(nodes, poses)
         self.page.send("map", self.view.map(grid, poses, loops))
         if self.foxglove:
             self.foxglove.map(stamp, OccupancyMap.of(grid))
@@ -181,5 +181,5 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
         stamps = (preprocessor.taken + np.arange(frames)) * radar.frame_period
         view.add(pipeline.push(preprocessor.process(adc, stamps)))
     view.frame(view.pictures(adc[-1:], np.ones((1, *adc.shape[1:3]), bool)), 0.0)
-    rehearse(pipeline.slam.config, BEARINGS)
+    warm_up(pipeline.slam.config, BEARINGS)
     return inputs

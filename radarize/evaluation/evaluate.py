@@ -69,7 +69,7 @@ def evaluate(
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`, of SLAM with ``nees``, see
         `radarize.evaluation.claims.pose_nees`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
-        Where the run tells it, ``blind``: `radarize.odometry.blindness.BlindSpans`.
+        Where the run tells it, ``blind``: `radarize.odometry.observability.UnobservableSpans`.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.

@@ -12,10 +12,11 @@ from typing import Any
 
 
 class _Odometry(ModuleType):
-    """The package, which is called as the function of the same name: importing a module of it would hide that."""
+    """A callable package. Importing one of its modules replaces the function `radarize.odometry` by this package, so
+    the package forwards calls to that function."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """See `radarize.estimate_odometry`."""
+        """Estimate odometry, see `radarize.estimate_odometry`."""
         import radarize
 
         return radarize.estimate_odometry(*arguments, **options)

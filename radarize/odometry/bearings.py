@@ -1,16 +1,16 @@
-"""Turns told by the bearings of strong echoes that are followed from frame to frame, and by walls that are met again.
+"""Heading from the bearings of strong echoes that are tracked from frame to frame, and from directions of walls.
 
-The bearing of an echo in the world is the heading plus its bearing in the sensor's frame. For a post or a corner it
-moves by its parallax, the velocity across over the range; for a wall's specular flash it stays the wall's normal
-wherever the sensor goes. One number tells the two apart, the share of its parallax by which an echo moves: 1 or 0. It
-is a number of the filter, as is the echo's bearing in the world, so that whatever tells of turns tells which of the two
-an echo is, other echoes above all; and as long as it is followed it tells of the whole turn since it was first seen, so
-that errors do not add up from frame to frame. Range and Doppler shift cannot tell: a slide along a wall and a circle
-about a post look the same.
+The bearing of an echo in the world frame is the heading plus its bearing in the sensor frame. For a point scatterer or
+a corner it changes by the parallax: cross-range velocity over range, integrated. For a wall's specular reflection it
+stays the wall's normal wherever the sensor moves. One number distinguishes the two, the share of the parallax by which
+the bearing changes: 1 or 0. This share and the bearing in the world frame are states of the filter. All measurements
+that observe the heading therefore help to classify an echo, above all other echoes. A tracked echo observes the total
+rotation since its first detection, so errors do not accumulate from frame to frame. Range and Doppler shift cannot
+distinguish the two types: a translation along a wall and a circle around a point scatterer look the same.
 
-Walls are remembered. Most of a building's stand at right angles, so one that is met says how far the heading has
-drifted since another one was seen, where it is hardly in doubt which one that was: in a building without right angles
-nothing is told.
+Wall directions are remembered. Most walls of a building are at right angles. A wall that is observed again, or one at a
+right angle to it, therefore observes the heading drift since then, if the association is unambiguous. In a building
+without right angles it is ambiguous, and no correction is made.
 """
 
 from collections.abc import Sequence
@@ -21,42 +21,44 @@ from jaxtyping import Float
 
 from radarize.io.pose import wrap
 from radarize.odometry.echoes import Echo
-from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import associate_direction, from_right_angle
 from radarize.odometry.smoother import Gaussian, Row
 from radarize.signal.heatmaps import Heatmaps
 
-#: Place of the heading in the filter.
+#: Index of the heading in the state of the filter.
 YAW = 0
-#: m and m/s: by how much an echo may be off what is expected of it in the next frame to be taken for the same; of its
-#: bearing, standard deviations.
-_RANGE, _SPEED, _SIGMAS = 0.06, 0.25, 2.5
-#: Standard deviation of a sine as a share of the beam's width, and rad/s^0.5: what a bearing in the world wanders.
-_NOISE, _WANDER = 0.04, np.radians(0.3)
-#: Maximum number of echoes; s without detection after which one is no longer followed; nearer to each other, m and rad,
-#: they are one. Below 4.8 frames a second so none is followed: what is taken for the same echo there is often another.
-_MOST, _LOST, _APART = 8, 0.21, (0.1, np.radians(10.0))
-#: Shares of parallax: standard deviations by which those of flashes and posts may differ from 0 and 1 until it is
-#: known which of them they are, and from then on, the post's for a range of 1 m beside `_OFF`, m, of its range.
-_SHARES, _ROUGH, _EXACT, _OFF = np.array([0.0, 1.0]), np.array([0.02, 0.06]), np.array([0.003, 0.015]), 0.02
-#: Log-odds from which on an echo is one of the two, its share being known this well, and standard deviations from both
-#: beyond which it is neither, such as a path over two walls or something that moves.
-_SURE, _KNOWN, _NEITHER = 10.0, 0.245, 3.5
-#: Frames in which a wall was seen before its normal counts; rad, by which normals of walls are not quite at right
-#: angles; directions remembered.
-_LASTING, _SQUARE, _DIRECTIONS = 5, np.radians(0.5), 6
+#: Maximum errors of the predicted echo for an association in the next frame: range (m), speed (m/s), bearing (standard
+#: deviations).
+_MAX_RANGE_CHANGE, _MAX_SPEED_ERROR, _SIGMAS = 0.06, 0.25, 2.5
+#: Standard deviation of a measured sine of azimuth as a share of the beam width; random walk of a bearing in the world
+#: frame, rad/s^0.5.
+_SINE_NOISE, _BEARING_WALK = 0.04, np.radians(0.3)
+#: Maximum number of tracked echoes; time without detection after which a track ends, s; distance (m, rad) below which
+#: two echoes are one. Below 4.8 frames/s no echo is tracked, because associations there are often wrong.
+_MAX_TRACKED, _MAX_AGE, _DUPLICATE = 8, 0.21, (0.1, np.radians(10.0))
+#: Share of the parallax of specular reflections (0) and point scatterers (1); size of a point scatterer, m; standard
+#: deviations of the share before and after the classification, per type. Size over range is added to the latter.
+_KIND_SHARES, _SCATTERER_SIZE = np.array([0.0, 1.0]), 0.02
+_SHARE_STD_BEFORE, _SHARE_STD_AFTER = np.array([0.02, 0.06]), np.array([0.003, 0.015])
+#: Classification of an echo: minimum log-odds, maximum standard deviation of its share; number of standard deviations
+#: from both types beyond which the echo is dropped, such as a double bounce or a moving object.
+_MIN_LOG_ODDS, _MAX_SHARE_STD, _NEITHER_SIGMAS = 10.0, 0.245, 3.5
+#: Minimum number of frames before a wall is associated with a direction; standard deviation of walls from right angles,
+#: rad; maximum number of remembered directions.
+_MIN_FRAMES, _RIGHT_ANGLE_STD, _MAX_DIRECTIONS = 5, np.radians(0.5), 6
 
 
 @dataclass
-class Followed:
-    """An echo that is followed.
+class TrackedEcho:
+    """An echo that is tracked from frame to frame.
 
     Attributes:
-        echo: as it was seen last, its range kept up to now.
-        seen: when that was, s.
-        frames: in which it was.
-        parallax: rad, by what the bearing of a post would have moved since it was seen first.
-        kind: 0, a wall's flash; 1, a post; None as long as nobody knows.
-        met: its wall was looked up among those that are remembered.
+        echo: last detection, with its range predicted to the current frame.
+        seen: time of the last detection, s.
+        frames: number of frames with a detection.
+        parallax: rad, change of the bearing since the first detection if it is a point scatterer.
+        kind: 0, a wall's specular reflection; 1, a point scatterer; None before the classification.
+        wall_associated: its wall was compared with the remembered directions.
     """
 
     echo: Echo
@@ -64,84 +66,88 @@ class Followed:
     frames: int = 1
     parallax: float = 0.0
     kind: int | None = None
-    met: bool = False
+    wall_associated: bool = False
 
 
-class Bearings:
-    """Follows echoes; frames are pushed in order.
+class BearingTracker:
+    """Tracker of echoes by range and bearing; frames are pushed in order.
 
     Args:
         heatmaps: of the radar.
-        state: the filter, whose numbers so far are others', the heading at `YAW`. Behind them stand normals of walls
-            that are remembered, then of each followed echo its bearing in the world at first, and its share.
-        right_angles: walls seen again correct the heading.
+        state: filter, which the caller shares; its heading is at `YAW`. The tracker appends the normals of the
+            remembered walls, then the bearing in the world frame at the first detection and the share of the parallax
+            of each tracked echo.
+        right_angles: correct the heading by walls that are observed again.
     """
 
     def __init__(self, heatmaps: Heatmaps, state: Gaussian, right_angles: bool = True):
         self._state, self._first = state, len(state.mean)
         self._span, self._right_angles = 2 * heatmaps.config.max_velocity, right_angles
-        self._range = max(_RANGE, (heatmaps.ranges[1] - heatmaps.ranges[0]) / 2)
-        self._noise = _NOISE * 2 / max(len(heatmaps.row), 1)  # antennas stand half a wavelength apart
-        self._walls: list[int] = []  # how many had each of the directions
-        self._followed: list[Followed] = []
+        self._range = max(_MAX_RANGE_CHANGE, (heatmaps.ranges[1] - heatmaps.ranges[0]) / 2)
+        self._noise = _SINE_NOISE * 2 / max(len(heatmaps.row), 1)  # antenna spacing: half a wavelength
+        self._walls: list[int] = []  # number of walls of each direction
+        self._tracked: list[TrackedEcho] = []
         self._time = -np.inf
 
     @property
-    def flashes(self) -> list[float]:
-        """Ranges of the walls' flashes in the last frame, m."""
-        return [each.echo.range for each in self._followed if each.kind == 0 and each.seen == self._time]
+    def specular_ranges(self) -> list[float]:
+        """Ranges of the walls' specular reflections in the last frame, m."""
+        return [each.echo.range for each in self._tracked if each.kind == 0 and each.seen == self._time]
 
-    def move(self, dt: float, velocity: Float[np.ndarray, "2"]) -> None:
-        """Let `dt` s pass at a velocity (m/s, sensor frame); the heading has moved already."""
-        for k, each in enumerate(self._followed):
+    def predict(self, dt: float, velocity: Float[np.ndarray, "2"]) -> None:
+        """Predict ranges and parallaxes `dt` s later, at a velocity (m/s, sensor frame); the heading is predicted by
+        the caller."""
+        for k, each in enumerate(self._tracked):
             bearing = float(self._row(k) @ self._state.mean)
             ahead = np.array([np.cos(bearing), np.sin(bearing)])
             away = each.echo.range - dt * float(velocity @ ahead)
             each.echo = each.echo._replace(range=away)
             each.parallax -= dt * float(velocity[1] * ahead[0] - velocity[0] * ahead[1]) / max(away, 0.1)
-            self._state.covariance[self._place(k), self._place(k)] += _WANDER**2 * dt
+            self._state.covariance[self._index(k), self._index(k)] += _BEARING_WALK**2 * dt
 
-    def see(self, time: float, echoes: Sequence[Echo], velocity: Float[np.ndarray, "2"]) -> bool:
-        """Correct the filter by a frame's echoes; False if nothing known is among them, so that they tell no turn."""
-        self._time, told = time, False
-        self._keep([k for k, each in enumerate(self._followed) if time - each.seen < _LOST])
-        new = [echo for echo in echoes if self._stands(echo, velocity)]
-        for k, each in enumerate(self._followed):
-            if (echo := self._again(k, each, new)) is not None:
+    def update(self, time: float, echoes: Sequence[Echo], velocity: Float[np.ndarray, "2"]) -> bool:
+        """Correct the filter by a frame's echoes; False if no classified echo is detected, so that the heading is
+        unobservable."""
+        self._time, observed = time, False
+        self._keep_only([k for k, each in enumerate(self._tracked) if time - each.seen < _MAX_AGE])
+        new = [echo for echo in echoes if self._is_static(echo, velocity)]
+        for k, each in enumerate(self._tracked):
+            if (echo := self._associate(k, each, new)) is not None:
                 new.remove(echo)
                 each.echo, each.seen, each.frames = echo, time, each.frames + 1
-                told |= each.kind is not None
-        self._keep([k for k, each in enumerate(self._followed) if self._judge(k, each)])
+                observed |= each.kind is not None
+        self._keep_only([k for k, each in enumerate(self._tracked) if self._classify(k, each)])
         for echo in new:
-            if len(self._followed) < _MOST and not any(self._beside(echo, each) for each in self._followed):
-                self._follow(echo)
-        for k, each in enumerate(self._followed if self._right_angles else ()):
-            if each.kind == 0 and not each.met and each.seen == time and each.frames > _LASTING:
-                each.met = True
-                self._meet(k)
-        return told
+            if len(self._tracked) < _MAX_TRACKED and not any(self._is_duplicate(echo, each) for each in self._tracked):
+                self._start(echo)
+        for k, each in enumerate(self._tracked if self._right_angles else ()):
+            if each.kind == 0 and not each.wall_associated and each.seen == time and each.frames > _MIN_FRAMES:
+                each.wall_associated = True
+                self._associate_wall(k)
+        return observed
 
-    def _place(self, k: int) -> int:
+    def _index(self, k: int) -> int:
         return self._first + len(self._walls) + 2 * k
 
     def _row(self, k: int) -> Row:
-        """The k-th followed echo's bearing in the sensor's frame."""
-        place = self._place(k)
-        return self._state.row({place: 1.0, place + 1: self._followed[k].parallax, YAW: -1.0})
+        """Row of the filter for the k-th bearing in the sensor frame."""
+        place = self._index(k)
+        return self._state.row({place: 1.0, place + 1: self._tracked[k].parallax, YAW: -1.0})
 
     def _variance(self, echo: Echo) -> float:
         return (self._noise / np.cos(echo.bearing)) ** 2
 
-    def _beside(self, echo: Echo, each: Followed) -> bool:
+    def _is_duplicate(self, echo: Echo, each: TrackedEcho) -> bool:
         off = abs(each.echo.range - echo.range), abs(each.echo.bearing - echo.bearing)
-        return each.seen == self._time and off[0] < _APART[0] and off[1] < _APART[1]
+        return each.seen == self._time and off[0] < _DUPLICATE[0] and off[1] < _DUPLICATE[1]
 
-    def _stands(self, echo: Echo, velocity: Float[np.ndarray, "2"]) -> bool:
+    def _is_static(self, echo: Echo, velocity: Float[np.ndarray, "2"]) -> bool:
         closing = velocity[0] * np.cos(echo.bearing) + velocity[1] * np.sin(echo.bearing)
-        return abs((echo.speed - closing + self._span / 2) % self._span - self._span / 2) < _SPEED
+        return abs((echo.speed - closing + self._span / 2) % self._span - self._span / 2) < _MAX_SPEED_ERROR
 
-    def _again(self, k: int, each: Followed, new: list[Echo]) -> Echo | None:
-        """Which of new echoes the k-th is, if any; the filter learns its bearing."""
+    def _associate(self, k: int, each: TrackedEcho, new: list[Echo]) -> Echo | None:
+        """Associate the k-th track with one of the new echoes, and correct the filter by its bearing; None if there is
+        none."""
         near = [echo for echo in new if abs(echo.range - each.echo.range) < self._range]
         if not near:
             return None
@@ -154,50 +160,50 @@ class Bearings:
         self._state.update(row, off, variance)
         return echo
 
-    def _judge(self, k: int, each: Followed) -> bool:
-        """Say what the k-th is, once it is known; False if it is neither a flash nor a post."""
+    def _classify(self, k: int, each: TrackedEcho) -> bool:
+        """Classify the k-th track if it is unambiguous; False if it is neither type."""
         if each.kind is not None or each.parallax == 0:
             return True
-        place = self._place(k) + 1
+        place = self._index(k) + 1
         share, variance = self._state.mean[place], self._state.covariance[place, place]
-        odds = -((share - _SHARES) ** 2) / (variance + _ROUGH**2) / 2
-        if odds.max() < -(_NEITHER**2) / 2:
+        log_likelihood = -((share - _KIND_SHARES) ** 2) / (variance + _SHARE_STD_BEFORE**2) / 2
+        if log_likelihood.max() < -(_NEITHER_SIGMAS**2) / 2:
             return False
-        if abs(odds[0] - odds[1]) > _SURE and variance < _KNOWN**2:
-            each.kind = int(odds.argmax())
-            off = np.hypot(_EXACT[each.kind], each.kind * _OFF / each.echo.range)
-            self._state.update(self._state.row({place: 1.0}), _SHARES[each.kind] - share, off**2)
+        if abs(log_likelihood[0] - log_likelihood[1]) > _MIN_LOG_ODDS and variance < _MAX_SHARE_STD**2:
+            each.kind = int(log_likelihood.argmax())
+            off = np.hypot(_SHARE_STD_AFTER[each.kind], each.kind * _SCATTERER_SIZE / each.echo.range)
+            self._state.update(self._state.row({place: 1.0}), _KIND_SHARES[each.kind] - share, off**2)
         return True
 
-    def _keep(self, stay: list[int]) -> None:
-        if len(stay) < len(self._followed):
-            places = [place for k in stay for place in (self._place(k), self._place(k) + 1)]
-            self._state.keep([*range(self._place(0)), *places])
-            self._followed = [self._followed[k] for k in stay]
+    def _keep_only(self, kept: list[int]) -> None:
+        if len(kept) < len(self._tracked):
+            places = [place for k in kept for place in (self._index(k), self._index(k) + 1)]
+            self._state.keep([*range(self._index(0)), *places])
+            self._tracked = [self._tracked[k] for k in kept]
 
-    def _follow(self, echo: Echo) -> None:
-        """From now on; half of its parallax is as good a guess as any, and flashes and posts are half off."""
+    def _start(self, echo: Echo) -> None:
+        """Start a track. Its share of the parallax is 0.5 +- 0.5 before the classification."""
         state, end = self._state, len(self._state.mean)
         state.add(end, state.row({YAW: 1.0}), echo.bearing, self._variance(echo))
         state.add(end + 1, state.row({}), 0.5, 0.5**2)
-        self._followed.append(Followed(echo, self._time))
+        self._tracked.append(TrackedEcho(echo, self._time))
 
-    def _meet(self, k: int) -> None:
-        """Look the k-th's wall up among the directions that are remembered."""
-        state, place = self._state, self._place(k)
+    def _associate_wall(self, k: int) -> None:
+        """Associate the wall of the k-th track with the remembered directions."""
+        state, place = self._state, self._index(k)
         rows = [state.row({place: 1.0, self._first + wall: -1.0}) for wall in range(len(self._walls))]
-        off = -past_right_angle(np.array([row @ state.mean for row in rows]))
-        variances = np.array([state.variance(row) + _SQUARE**2 for row in rows])
-        met = recognised(off, variances, self._walls)
-        if met is None:
+        off = -from_right_angle(np.array([row @ state.mean for row in rows]))
+        variances = np.array([state.variance(row) + _RIGHT_ANGLE_STD**2 for row in rows])
+        direction = associate_direction(off, variances, self._walls)
+        if direction is None:
             return
-        if met < len(rows):
-            state.update(rows[met], off[met], _SQUARE**2)
-            self._walls[met] += 1
+        if direction < len(rows):
+            state.update(rows[direction], off[direction], _RIGHT_ANGLE_STD**2)
+            self._walls[direction] += 1
             return
-        if len(self._walls) == _DIRECTIONS:
+        if len(self._walls) == _MAX_DIRECTIONS:
             rarest = int(np.argmin(self._walls))
             state.keep([place for place in range(len(state.mean)) if place != self._first + rarest])
             self._walls.pop(rarest)
-        state.add(self._place(0), state.row({self._place(k): 1.0}), 0.0, 0.0)
+        state.add(self._index(0), state.row({self._index(k): 1.0}), 0.0, 0.0)
         self._walls.append(1)

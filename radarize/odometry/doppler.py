@@ -1,16 +1,23 @@
-"""Ego-velocity from the Doppler shifts of a static world: the classical odometry that networks must beat.
+"""Ego-velocity from the Doppler shifts of a static world: the classical baseline of the networks.
 
-An echo from unit direction u of a static world closes at v . u, v being the sensor's velocity. Echoes are peaks of a
-burst's range-Doppler-azimuth cube. Their u_y comes from the azimuth row, their u_z from the phase between the elevation
-pairs, so that ceiling and floor, which close more slowly than the wall below them, fit the same model. RANSAC rejects
-people, ghosts and aliased echoes; reweighted least squares refines and yields the covariance (after Doer and
-Trommer, "An EKF based approach to radar inertial odometry", 2020: REVE).
+The closing speed of a static echo from unit direction u is v . u, where v is the sensor's velocity. Echoes are peaks of
+the range-Doppler-azimuth cube of a burst. The azimuth row measures u_y, and the phase between the elevation pairs
+measures u_z, so that echoes of ceiling and floor fit the same model as echoes of walls.
 
-Regressors with errors bend a fit. An echo that reads u_z = 0 comes from a little above and below, so its u_x is less
-than the reading says, and v comes out short: by 0.8 % in offices, 2.5 % between bare walls. So each echo brings the
-variance of its own u_z along, told by the coherence of the elevation pairs as in interferometry, and the fit regresses
-on the expected direction (regression calibration: Carroll, Ruppert, Stefanski, Crainiceanu, "Measurement error in
-nonlinear models", 2006, ch. 4),
+In a furnished room most peaks are no single direct echo: several echoes share their cell, or they came over several
+surfaces, and both close more slowly than a direct echo of the same azimuth. The likelihood of a velocity is therefore
+that of a mixture: an echo is direct, with an error of its own standard deviation, or its closing speed is uniform over
+the unambiguous span (MLESAC: Torr and Zisserman, "MLESAC: A new robust estimator with application to estimating image
+geometry", 2000). Before its speed is compared with any velocity, the odds that an echo is direct follow from how well
+one plane wave fits its cell, in azimuth and in elevation. Pairs of echoes give hypotheses. Expectation maximisation
+refines the likeliest one by weighted least squares, which yields the covariance (after Doer and Trommer, "An EKF based
+approach to radar inertial odometry", 2020: REVE).
+
+Errors in the regressors bias a fit. An echo with measured u_z = 0 comes from a little above or below, so its u_x is
+smaller than measured, and the estimated speed is too small: by 0.8 % in offices, by 2.5 % between bare walls. Each echo
+therefore has a variance of its own u_z, estimated from the coherence of the elevation pairs as in interferometry, and
+the fit uses the expected direction (regression calibration: Carroll, Ruppert, Stefanski, Crainiceanu, "Measurement
+error in nonlinear models", 2006, ch. 4),
 
     E[u_x] = sqrt(1 - u_y^2 - E[u_z]^2 - Var[u_z]).
 """
@@ -24,6 +31,7 @@ from jaxtyping import Bool, Complex64, Float, Int
 from numba import njit
 
 from radarize.io.plain import Frozen, setting
+from radarize.odometry.mixture import MIN_ECHOES, fit_velocity
 from radarize.odometry.parabola import vertex
 from radarize.radar.array import ROW, virtual_positions
 from radarize.signal.batch import Batch
@@ -32,13 +40,13 @@ from radarize.signal.heatmaps import Heatmaps
 
 @dataclass(frozen=True)
 class Velocities:
-    """Sensor velocities, one per frame, at the frames' burst centres.
+    """Sensor velocities, one per frame, at the burst centres.
 
     Attributes:
         velocity: (frame, 2) m/s, sensor frame (x forward, y left).
-        covariance: (frame, 2, 2) (m/s)^2; large where the echoes do not determine a velocity.
-        inliers: (frame,) echoes that agree with the velocity.
-        seen: (frame,) False where nothing determines a velocity, and what is given here is as good as none.
+        covariance: (frame, 2, 2) (m/s)^2; large where the velocity is unobservable.
+        inliers: (frame,) number of echoes that agree with the velocity.
+        seen: (frame,) False where the velocity is unobservable; its value there has no meaning.
     """
 
     velocity: Float[np.ndarray, "frame 2"]
@@ -100,13 +108,13 @@ class DopplerConfig(Frozen):
 
 
 class DopplerVelocity:
-    """Velocity estimator by robust least squares over Doppler peaks; stateless between frames.
+    """Velocity estimator by robust least squares over Doppler peaks; it keeps no state between frames.
 
-    Speeds beyond `config.max_velocity` are as `Batch.aliases` has them. Residuals are taken modulo the unambiguous
-    span, so where nothing tells aliases, a faster walk is still found from the echoes to the side.
+    `Batch.aliases` resolves speeds beyond `config.max_velocity`. Residuals are taken modulo the unambiguous span, so a
+    higher speed is also found where the aliases are not resolved, from echoes to the side.
 
     Attributes:
-        lever: m, see `VelocityEstimator`.
+        lever: m, lever arm, see `VelocityEstimator`.
     """
 
     def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None):
@@ -118,36 +126,39 @@ class DopplerVelocity:
         self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u))
         self._steering = self._steering.to(torch.complex64)
         self._array = _array(heatmaps, self._u)
-        # An echo's phase turns with its way to the transmitter and back to the receiver: it is the middle that moves.
+        # The phase of an echo follows the path from the transmitter to the target to the receiver, so the measured
+        # velocity is that of the point midway between transmitter and receiver, averaged over the row.
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
-        flat, short = self.pairs is None, len(self.row) < ROW
-        self._rough = self.settings.rough * (2 if short else 1 if flat else 0)
-        # One table of random numbers for all frames: the same frame gives the same answer in any batch.
-        self._draws = np.random.default_rng(0).random((self.settings.hypotheses, 2))
+        no_elevation, short_row = self.pairs is None, len(self.row) < ROW
+        self._rough = self.settings.rough * (2 if short_row else 1 if no_elevation else 0)
+        # One table of random numbers for all frames: the result of a frame does not depend on its batch.
+        self._random = np.random.default_rng(0).random((self.settings.hypotheses, 2))
 
     def estimate(self, batch: Batch) -> Velocities:
-        """Velocities of the next frames."""
+        """Return the velocities of the next frames."""
         spectrum = batch.spectrum
         power = self._heatmaps.beamformed(spectrum, self.row, self._steering).numpy()
         frames = zip(spectrum.numpy(), power, batch.aliases, strict=True)
         found = [self.solve(self._echoes(*frame)) for frame in frames]
         velocity, covariance, inliers = map(np.array, zip(*found, strict=True))
-        seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
-        doubt = 1 + (self.settings.few / inliers[seen]) ** 4
-        covariance[seen] = doubt[:, None, None] * covariance[seen] + self._shared(velocity[seen])
+        seen = (np.linalg.eigvalsh(covariance)[:, -1] < _MAX_STD**2) & (inliers >= MIN_ECHOES)
+        inflation = 1 + (self.settings.few / inliers[seen]) ** 4
+        covariance[seen] = inflation[:, None, None] * covariance[seen] + self._common_covariance(velocity[seen])
         return Velocities(velocity, covariance, inliers, seen)
 
-    def _shared(self, velocity: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "frame 2 2"]:
-        """Covariance of the errors that all echoes of a frame have in common: none of the fit's residuals tells."""
+    def _common_covariance(self, velocity: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "frame 2 2"]:
+        """Covariance of the errors that all echoes of a frame have in common. The residuals of the fit do not contain
+        them."""
         s = self.settings
         across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
         along, side = (v[:, :, None] * v[:, None] for v in (velocity, across))
         scale, course = (noise**2 + self._rough**2 for noise in (s.scale_noise, s.course_noise))
         return scale * along + course * side + s.floor**2 * np.eye(2)
 
-    def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
-        """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z and its variance, power over the median."""
+    def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 7"]:
+        """Return the peaks of one frame: range bin, closing speed (m/s), u_y, u_z, variance of u_z, power over the
+        median, share of the cell's power over the row that one plane wave explains."""
         power = self._heatmaps.beamformed(spectrum[None], self.row, self._steering)[0].numpy()
         return self._echoes(spectrum.numpy(), power, np.zeros(spectrum.shape[1], int))
 
@@ -162,29 +173,37 @@ class DopplerVelocity:
         echoes[:, 5] /= max(level, 1e-12)
         return echoes
 
-    def solve(self, echoes: Float[np.ndarray, "echo 6"]) -> tuple[np.ndarray, np.ndarray, int]:
-        """Velocity (2,) m/s, its covariance (2, 2) and the number of agreeing echoes, by a frame's `echoes`."""
+    def solve(self, echoes: Float[np.ndarray, "echo 7"]) -> tuple[np.ndarray, np.ndarray, int]:
+        """Return the velocity (2,) in m/s, its covariance (2, 2) and the number of inliers from a frame's `echoes`."""
         s = self.settings
-        # Without elevation pairs no echo tells of the climb.
+        # Without elevation pairs the vertical speed is unobservable.
         climb = s.climb if self.pairs is not None else 1e-3
         noise = np.array([s.speed_noise, s.power_noise, s.azimuth_noise, s.elevation, climb])
-        # Of a single echo, too, in the layout that the loop is compiled for.
+        # A single echo, too, has to have the memory layout that the loop is compiled for.
         seen = np.ascontiguousarray(echoes[:, 1:])
-        velocity, covariance, inliers = _fit(seen, self._draws, noise, s.inlier, 2 * self.config.max_velocity)
+        span = 2 * self.config.max_velocity
+        velocity, covariance, inliers = fit_velocity(seen, self._odds(seen), self._random, noise, s.guess, span)
         if inliers and np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
             if velocity @ np.linalg.solve(covariance, velocity) < _SIGMAS**2:
                 velocity = np.zeros(2)
         return velocity, covariance, inliers
 
+    def _odds(self, echoes: Float[np.ndarray, "echo 6"]) -> Float[np.ndarray, "echo"]:
+        """Prior odds that echoes are direct. Incoherent elevation pairs show several echoes in a cell."""
+        spread, purity = echoes[:, 3], np.minimum(echoes[:, 5], 1)
+        odds = self.settings.direct * purity / (1 - purity + _IMPURITY)
+        return odds if self.pairs is None else odds * np.maximum(1 - spread / self.settings.beam**2, 0)
+
 
 class _Array(NamedTuple):
-    """What `_refine` knows of the radar: direction cosines of beams and speeds of bins, with the bins' width (m/s);
-    antennas of the elevation pairs and their height / wavelength; per antenna y / wavelength and TDM phase per speed
-    (rad s/m)."""
+    """Radar parameters of `_refine`: direction cosines of beams, speeds of Doppler bins and their width (m/s); antennas
+    of the row; antennas of the elevation pairs and their height / wavelength; per antenna y / wavelength and TDM phase
+    per speed (rad s/m)."""
 
     u: np.ndarray
     velocities: np.ndarray
     bin_width: float
+    row: np.ndarray
     pairs: np.ndarray
     height: float
     y: np.ndarray
@@ -199,22 +218,25 @@ def _array(heatmaps: Heatmaps, u: np.ndarray) -> _Array:
     height = float(heights[1] - heights[0]) if len(heights) > 1 else 0.5
     pairs = np.zeros((0, 2), np.int64) if heatmaps.pairs is None else heatmaps.pairs.astype(np.int64)
     tdm = 4 * np.pi / config.wavelength * delay
-    return _Array(u, heatmaps.velocities, config.velocity_resolution, pairs, height, positions[:, 1].copy(), tdm)
+    row, y = np.asarray(heatmaps.row, np.int64), positions[:, 1].copy()
+    return _Array(u, heatmaps.velocities, config.velocity_resolution, row, pairs, height, y, tdm)
 
 
-#: m/s, what nobody walks: keeps the fit regular where all echoes come from one direction.
-UNKNOWN_SPEED = 10.0
-#: Fewer echoes than these determine no velocity; nor do those that leave a standard deviation, m/s, as large as that.
-_ECHOES, _DETERMINED = 4, 0.3
-#: Standard deviations from which a velocity is not zero: a walk that sets in is slow, but its speed is well known.
+#: Share of a direct echo's power that its plane wave leaves, by noise and by what calibration leaves.
+_IMPURITY = 0.003
+#: Maximum standard deviation of an observable velocity, m/s.
+_MAX_STD = 0.3
+#: Number of standard deviations beyond which a velocity differs from zero: a starting walk is slow, but its speed is
+#: well known.
 _SIGMAS = 3.0
-#: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
+#: Power relative to a stronger peak of the same range and Doppler below which a peak may be its sidelobe (-25 dB, and
+#: mismatch).
 SIDELOBE = 0.1
 
 
 @njit(cache=True)
 def _peaks(power, threshold, first):
-    """Local maxima of the cube (range, doppler cyclic, beam) above a threshold, as index triples."""
+    """Local maxima of the cube (range, Doppler cyclic, beam) above a threshold, as index triples."""
     ranges, bins, beams = power.shape
     found = []
     for r in range(max(first, 1), ranges - 1):
@@ -239,22 +261,22 @@ def _peaks(power, threshold, first):
 
 
 @njit(cache=True)
-def _between(left, middle, right):
-    """Offset in bins of a peak, by three powers."""
+def _peak_offset(left, middle, right):
+    """Offset of a peak from its bin, in bins, by interpolation of three powers."""
     return vertex(np.log(left + 1e-30), np.log(middle + 1e-30), np.log(right + 1e-30))
 
 
 @njit(cache=True)
 def _refine(found, power, cells, array, beam):
-    """Echoes between bins: (range bin, speed, u_y, u_z, variance of u_z, power)."""
-    u, velocities, bin_width, pairs, height, y, tdm = array
-    echoes = np.empty((len(found), 6))
+    """Interpolate the peaks between bins; returns echoes: range bin, speed, u_y, u_z, its variance, power, purity."""
+    u, velocities, bin_width, row, pairs, height, y, tdm = array
+    echoes = np.empty((len(found), 7))
     bins = power.shape[1]
     for i in range(len(found)):
         r, d, b = found[i]
         p = power[r, d, b]
-        speed_offset = bin_width * _between(power[r, (d - 1) % bins, b], p, power[r, (d + 1) % bins, b])
-        u_y = u[b] + (u[1] - u[0]) * _between(power[r, d, b - 1], p, power[r, d, b + 1])
+        speed_offset = bin_width * _peak_offset(power[r, (d - 1) % bins, b], p, power[r, (d + 1) % bins, b])
+        u_y = u[b] + (u[1] - u[0]) * _peak_offset(power[r, d, b - 1], p, power[r, d, b + 1])
         u_z, spread = 0.0, beam**2
         if len(pairs):
             lower, upper, total = 0.0j, 0.0j, 1e-30
@@ -268,89 +290,19 @@ def _refine(found, power, cells, array, beam):
                     else:
                         upper += value
             u_z = -np.angle(upper * np.conj(lower)) / (2 * np.pi * height)
-            # Echoes spread by s in u_z keep a coherence of exp(-(2 pi height s)^2 / 2) between the two heights; what
-            # differs in power does not belong together either.
+            # The coherence of echoes with standard deviation s of u_z is exp(-(2 pi height s)^2 / 2). A difference in
+            # power between the two heights reduces it too.
             coherence = min(max(2 * abs(upper * lower) / (len(pairs) * total), 1e-6), 1 - 1e-6)
-            apart = -2 * np.log(coherence) / (2 * np.pi * height) ** 2
-            spread = apart * beam**2 / (apart + beam**2)
+            spread_squared = -2 * np.log(coherence) / (2 * np.pi * height) ** 2
+            spread = spread_squared * beam**2 / (spread_squared + beam**2)
+        wave, total = 0.0j, 1e-30
+        for antenna in row:
+            value = cells[r, d, antenna]
+            wave += value * np.exp(1j * (2 * np.pi * y[antenna] * u_y + tdm[antenna] * speed_offset))
+            total += value.real**2 + value.imag**2
+        echoes[i, 6] = (wave.real**2 + wave.imag**2) / (len(row) * total)
         limit = 0.98 * np.sqrt(max(1 - u_y * u_y, 0.0))
         u_z = min(max(u_z, -limit), limit)
         echoes[i, 0], echoes[i, 4], echoes[i, 5] = r, spread, p
         echoes[i, 1], echoes[i, 2], echoes[i, 3] = velocities[d] + speed_offset, u_y, u_z
     return echoes
-
-
-@njit(cache=True)
-def _wrap(residual, span):
-    return residual - span * np.rint(residual / span)
-
-
-@njit(cache=True)
-def _fit(echoes, draws, noise, inlier, span):
-    """RANSAC over pairs of echoes, then iteratively reweighted least squares for (vx, vy, vz)."""
-    count = len(echoes)
-    unknown = np.array([[1.0, 0.0], [0.0, 1.0]])
-    if count < _ECHOES:
-        return np.zeros(2), unknown, 0
-    speed, spread, power = echoes[:, 0], echoes[:, 3], echoes[:, 4]
-    speed_noise, power_noise, azimuth_noise, elevation, climb = noise
-    u = np.empty((count, 3))
-    u[:, 1], u[:, 2] = echoes[:, 1], echoes[:, 2] * elevation**2 / (elevation**2 + spread)
-    u[:, 0] = np.sqrt(np.maximum(1 - u[:, 1] ** 2 - u[:, 2] ** 2 - spread, 0.02))
-
-    limit = max(1.5 * span / 2, 1.2 * np.abs(speed).max())
-    best, score = np.zeros(2), -1.0
-    for h in range(len(draws) + 1):
-        v = np.zeros(2)  # the first hypothesis is standing still
-        if h:
-            i, j = int(draws[h - 1, 0] * count), int(draws[h - 1, 1] * count)
-            det = u[i, 0] * u[j, 1] - u[j, 0] * u[i, 1]
-            if abs(det) < 0.15:
-                continue
-            v[0] = (speed[i] * u[j, 1] - speed[j] * u[i, 1]) / det
-            v[1] = (u[i, 0] * speed[j] - u[j, 0] * speed[i]) / det
-            if v[0] ** 2 + v[1] ** 2 > limit**2:
-                continue
-        total = 0.0
-        for k in range(count):
-            e = _wrap(speed[k] - v[0] * u[k, 0] - v[1] * u[k, 1], span) / inlier
-            total += max(1 - e * e, 0.0)
-        if total > score:
-            best, score = v, total
-
-    v = np.array([best[0], best[1], 0.0])
-    normal = np.zeros((3, 3))
-    scale, inliers = 1.0, 0
-    for iteration in range(8):
-        normal[:] = 0.0
-        normal[0, 0] = normal[1, 1] = 1 / UNKNOWN_SPEED**2
-        normal[2, 2] = 1 / climb**2
-        right = np.zeros(3)
-        squares, weights, inliers = 0.0, 0.0, 0
-        # RANSAC's result is rough: weights sharpen step by step, or a few strong echoes would hold the fit there.
-        rough = (0.5 * inlier * 0.5**iteration) ** 2
-        for k in range(count):
-            # u_x is not measured but follows from u_y and u_z, and so do their errors. The reading of u_z is a mean
-            # over the elevation pairs; what it leaves of u_z^2 is distributed like the square of a Gaussian.
-            by_y = v[1] - v[0] * u[k, 1] / u[k, 0]
-            by_z = v[2] - v[0] * u[k, 2] / u[k, 0]
-            variance = rough + speed_noise**2 + power_noise**2 / power[k] + (by_y * azimuth_noise) ** 2
-            variance += 0.5 * spread[k] * (by_z**2 + spread[k] * (v[0] / u[k, 0]) ** 2)
-            predicted = v[0] * u[k, 0] + v[1] * u[k, 1] + v[2] * u[k, 2]
-            e = _wrap(speed[k] - predicted, span)
-            z = e * e / variance
-            w = 1 / (1 + z / 9) ** 2  # Geman-McClure: an outlier loses all say
-            inliers += z < 9
-            squares += w * z
-            weights += w
-            for a in range(3):
-                right[a] += w / variance * u[k, a] * (e + predicted)
-                for b in range(3):
-                    normal[a, b] += w / variance * u[k, a] * u[k, b]
-        v = np.linalg.solve(normal, right)
-        scale = max(squares / max(weights - 2, 1.0), 1.0)
-    covariance = np.linalg.inv(normal)[:2, :2] * scale
-    # Few agreeing echoes, or few of all: the fit may be to something else altogether.
-    share = inliers / count
-    covariance *= 1 + (0.5 / max(share, 0.05)) ** 4 + (8 / max(inliers, 1)) ** 4
-    return v[:2].copy(), covariance.copy(), inliers

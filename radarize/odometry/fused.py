@@ -1,4 +1,4 @@
-"""Network and least squares together, each by what it says of its own error."""
+"""Fusion of the velocities by the network and by least squares, weighted by their covariances."""
 
 from dataclasses import replace
 
@@ -11,19 +11,18 @@ from radarize.signal.batch import Batch
 
 
 class FusedVelocity:
-    """Velocity estimator that weighs two others by their covariances and the correlation of their errors: both look at
-    the same samples (Bar-Shalom and Campo, "The effect of the common process noise on the two-sensor fused-track
-    covariance", 1986).
+    """Velocity estimator that fuses two others, weighted by their covariances and the correlation of their errors, as
+    both use the same samples (Bar-Shalom and Campo, "The effect of the common process noise on the two-sensor
+    fused-track covariance", 1986).
 
-    Where they contradict each other by more than both admit, at least one is wrong without knowing: then both are
-    believed less.
+    Where the two differ by more than their covariances explain, the fused covariance is inflated.
 
     Args:
-        learned, doppler, settings: both, and what may be set.
-        always: the network is asked of every frame, not of those alone of which least squares are unsure.
+        learned, doppler, settings: both estimators, and the settings of the fusion.
+        always: evaluate the network for every frame, not only where the covariance of least squares is large.
 
     Attributes:
-        lever: m, see `VelocityEstimator`: that of least squares, which has most of the say.
+        lever: m, lever arm of the least-squares estimate, which has the larger weight; see `VelocityEstimator`.
     """
 
     def __init__(
@@ -37,22 +36,24 @@ class FusedVelocity:
         self.lever, self.always = doppler.lever, always
 
     def estimate(self, batch: Batch) -> Velocities:
-        """Velocities of the next frames."""
-        other = self.doppler.estimate(batch)
-        unsure = np.linalg.eigvalsh(other.covariance)[:, -1] > self.settings.sure**2
-        one = self.learned.estimate(batch, unsure | self.always)
-        # Faster than the network sees, its maps are empty.
-        seen = one.seen & (np.hypot(*other.velocity.T) <= self.learned.limit)
-        one = replace(one, seen=seen, covariance=np.where(seen[:, None, None], one.covariance, ANY_VELOCITY))
-        roots = np.linalg.cholesky(one.covariance), np.linalg.cholesky(other.covariance)
-        # What one estimator knows nothing of has no error in common with the other.
-        both = self.settings.correlation * (one.seen & other.seen)
-        common = both[:, None, None] * roots[0] @ roots[1].mT
-        apart = (one.velocity - other.velocity)[:, :, None]
-        total = one.covariance + other.covariance - common - common.mT
-        distance = (apart.mT @ np.linalg.solve(total, apart))[:, 0, 0]
-        weight = (one.covariance - common) @ np.linalg.inv(total)
-        velocity = one.velocity - (weight @ apart)[:, :, 0]
-        covariance = one.covariance - weight @ (one.covariance - common.mT)
+        """Return the velocities of the next frames."""
+        doppler = self.doppler.estimate(batch)
+        uncertain = np.linalg.eigvalsh(doppler.covariance)[:, -1] > self.settings.sure**2
+        network = self.learned.estimate(batch, uncertain | self.always)
+        # Beyond the speed range of the network its input maps are empty.
+        seen = network.seen & (np.hypot(*doppler.velocity.T) <= self.learned.limit)
+        network = replace(
+            network, seen=seen, covariance=np.where(seen[:, None, None], network.covariance, ANY_VELOCITY)
+        )
+        roots = np.linalg.cholesky(network.covariance), np.linalg.cholesky(doppler.covariance)
+        # An estimator without a measurement has no error in common with the other.
+        correlation = self.settings.correlation * (network.seen & doppler.seen)
+        common = correlation[:, None, None] * roots[0] @ roots[1].mT
+        difference = (network.velocity - doppler.velocity)[:, :, None]
+        total = network.covariance + doppler.covariance - common - common.mT
+        distance = (difference.mT @ np.linalg.solve(total, difference))[:, 0, 0]
+        weight = (network.covariance - common) @ np.linalg.inv(total)
+        velocity = network.velocity - (weight @ difference)[:, :, 0]
+        covariance = network.covariance - weight @ (network.covariance - common.mT)
         covariance *= np.maximum(distance / self.settings.gate, 1.0)[:, None, None]
-        return Velocities(velocity, (covariance + covariance.mT) / 2, other.inliers, one.seen | other.seen)
+        return Velocities(velocity, (covariance + covariance.mT) / 2, doppler.inliers, network.seen | doppler.seen)

@@ -16,22 +16,23 @@ from radarize.odometry.uncertainty import ErrorModel, half_turned
 from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Batch
 
-#: m/s^1.5 and s: between two frames velocity is a random walk whose ends are known, and a smooth one over less than a
-#: second. What that adds to a step is within a fifth of what true velocities by hand do, over 0.2 to 2 s (data set
-#: odometry-choice: four handheld walks of 20 s in buildings A to D of seed 201).
-_BRIDGED, _SMOOTH = 0.32, 1.0
-#: s, over which turns are averaged to a rate.
-_STEADY = 0.1
-#: s, time constant of the correlation of errors of velocities, those in a row being of the same echoes (chosen on 12
-#: walks of 60 s: handheld, cart and robot in A to D of seeds 301 to 304).
-LASTING = 1.0
+#: Interpolation error of the velocity between two frames: random walk of the velocity, m/s^1.5, given its value at both
+#: ends, and the time below which the velocity is smooth, s. The error of a step agrees within 20 % with true velocities
+#: of handheld walks, over 0.2 to 2 s (data set odometry-choice: four handheld walks of 20 s in buildings A to D of seed
+#: 201).
+_VELOCITY_WALK, _SMOOTH_TIME = 0.32, 1.0
+#: Time constant of the low-pass filter of the yaw rate, s.
+_YAW_RATE_TIME = 0.1
+#: Time constant of the correlation of velocity errors, s: consecutive velocities come from the same echoes (chosen on
+#: 12 walks of 60 s: handheld, cart and robot in A to D of seeds 301 to 304).
+CORRELATION_TIME = 1.0
 
 
 class VelocityEstimator(Protocol):
-    """Sensor velocities at burst centres.
+    """Estimator of the sensor velocity at burst centres.
 
     Attributes:
-        lever: m, how far to the left of the sensor's origin the point lies whose velocity this is.
+        lever: m, lever arm: y of the point whose velocity is estimated, in the sensor frame.
     """
 
     lever: float
@@ -40,11 +41,11 @@ class VelocityEstimator(Protocol):
 
 
 class RotationEstimator(Protocol):
-    """Yaw increments from frame to frame, given the filtered velocities.
+    """Estimator of the yaw increments from frame to frame, given the filtered velocities.
 
     Attributes:
-        lag: standard deviation of a turn as a share of it, beside its own. Who lags in a turn lags in all of its
-            frames: errors of up to 6 deg a corner add up instead of averaging out.
+        lag: standard deviation of the scale error of a yaw increment, as a share of it. An estimate that lags in a turn
+            lags in all of its frames, so these errors add up, to 6 deg in a turn of 90 deg.
     """
 
     lag: float
@@ -58,13 +59,13 @@ class Track:
 
     Attributes:
         time: (frame,) burst centres, s.
-        pose: (frame, 3) x, y (m) and yaw (rad, wrapped), the first frame of all being the origin.
-        step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
-        velocity: (frame, 2) filtered, m/s, sensor frame.
+        pose: (frame, 3) x, y (m) and yaw (rad, wrapped), relative to the first frame of the recording.
+        step: (frame, 3) motion since the previous frame, in the sensor frame there: x, y (m), yaw (rad).
+        velocity: (frame, 2) filtered velocity, m/s, sensor frame.
         velocity_covariance: (frame, 2, 2), m^2/s^2.
-        velocity_seen, turn_seen: (frame,) False where odometry was blind: nothing determined the velocity at the frame,
-            or the turn since the one before; what stands there is what went before.
-        errors: of the steps.
+        velocity_seen, turn_seen: (frame,) False where the velocity at the frame, or the yaw increment since the
+            previous frame, was unobservable; the values there are predictions.
+        errors: error model of the steps.
     """
 
     time: Float[np.ndarray, "frame"]
@@ -88,7 +89,7 @@ class VelocityConfig(Frozen):
 
 
 class VelocityFilter:
-    """Causal Kalman filter of the planar velocity as a random walk; what is far off its prediction counts less."""
+    """Causal Kalman filter of the planar velocity, modelled as a random walk. Outliers are down-weighted."""
 
     def __init__(self, settings: VelocityConfig | None = None):
         self.settings = settings or VelocityConfig()
@@ -96,7 +97,7 @@ class VelocityFilter:
         self._velocity, self._covariance = np.zeros(2), self.settings.fastest**2 * np.eye(2)
 
     def filter(self, times: Float[np.ndarray, "frame"], measured: Velocities) -> Velocities:
-        """Filtered velocities of the next frames."""
+        """Return the filtered velocities of the next frames."""
         s = self.settings
         velocity, covariance = np.empty_like(measured.velocity), np.empty_like(measured.covariance)
         for i, time in enumerate(times):
@@ -117,7 +118,7 @@ class VelocityFilter:
 
 
 class Odometry:
-    """Radar odometry in a stream. Memory does not grow."""
+    """Radar odometry of a stream of frames, in constant memory."""
 
     def __init__(
         self,
@@ -128,15 +129,15 @@ class Odometry:
     ):
         self.config, self.velocity, self.rotation = radar, velocity, rotation
         self._filter = VelocityFilter(settings)
-        self._rate = 0.0  # of turning, rad/s, without the matches' jitter
+        self._rate = 0.0  # yaw rate, rad/s, low-pass filtered
         self._pose = np.zeros(3)
         self._last: tuple[float, np.ndarray, np.ndarray] | None = None  # time, velocity, covariance
 
     def update(self, batch: Batch) -> Track:
-        """Poses of the next frames.
+        """Return the poses of the next frames.
 
         Raises:
-            InputError: stamps that do not increase.
+            InputError: time stamps do not increase.
         """
         steps = intervals(batch.centers, None if self._last is None else self._last[0])
         with stage("translation"):
@@ -146,10 +147,10 @@ class Odometry:
         return self._integrate(batch.centers, self._at_origin(steps, velocities, rotations), rotations)
 
     def _at_origin(self, steps: np.ndarray, measured: Velocities, rotations: Rotations) -> Velocities:
-        """Velocities of the sensor's origin, which does not swing about it as the estimator's point does."""
+        """Velocities of the sensor's origin: the lever arm times the yaw rate is removed."""
         velocity = measured.velocity.copy()
         for i, (dt, yaw) in enumerate(zip(steps, rotations.yaw, strict=True)):
-            self._rate += -np.expm1(-dt / _STEADY) * (yaw / dt - self._rate)
+            self._rate += -np.expm1(-dt / _YAW_RATE_TIME) * (yaw / dt - self._rate)
             velocity[i, 0] += self.velocity.lever * self._rate
         return replace(measured, velocity=velocity)
 
@@ -168,7 +169,7 @@ class Odometry:
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
                 half, lag = half_turned(step[i]), (self.rotation.lag * rotations.yaw[i]) ** 2
                 noise[i] = min(rotations.noise[i] + lag, np.pi**2) * np.outer(half, half)
-                noise[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
+                noise[i, :2, :2] += np.eye(2) * _VELOCITY_WALK**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH_TIME**2)
                 correlation[i, 1] = _correlation(dt, last_spread, spread)
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
@@ -177,17 +178,18 @@ class Odometry:
         return Track(times, pose, step, velocities.velocity, velocities.covariance, *seen, errors)
 
 
-def _correlation(dt: float, before: Float[np.ndarray, "2 2"], now: Float[np.ndarray, "2 2"]) -> float:
-    """Share of a velocity's error that goes on for `dt` s: no more than leaves the covariance that it has now."""
-    least = np.linalg.eigvals(np.linalg.solve(before, now)).real.min()
-    return float(np.exp(-dt / LASTING) * np.sqrt(np.clip(least, 0.0, 1.0)))
+def _correlation(dt: float, previous: Float[np.ndarray, "2 2"], now: Float[np.ndarray, "2 2"]) -> float:
+    """Share of a velocity error that persists for `dt` s, limited such that it does not exceed the covariance `now`."""
+    least = np.linalg.eigvals(np.linalg.solve(previous, now)).real.min()
+    return float(np.exp(-dt / CORRELATION_TIME) * np.sqrt(np.clip(least, 0.0, 1.0)))
 
 
 def intervals(times: Float[np.ndarray, "frame"], last: float | None) -> Float[np.ndarray, "frame"]:
-    """Seconds since the frame before, a frame of any batch before at `last`; 1 if there is none.
+    """Seconds since the previous frame; for the first frame since `last`, the last frame of the previous batch, or 1 s
+    if there is none.
 
     Raises:
-        InputError: stamps that do not increase.
+        InputError: time stamps do not increase.
     """
     steps = np.diff(times, prepend=times[0] - 1 if last is None else last)
     if not (steps > 0).all():

@@ -1,4 +1,4 @@
-"""Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others."""
+"""Velocity and rotation estimators by the networks (paper, sections 4.2 and 4.3)."""
 
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,7 @@ from radarize.odometry.smoother import FixedLagSmoother
 from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Batch
 
-#: (m/s)^2, covariance of a velocity of which a network says nothing.
+#: Covariance of a velocity without network output, (m/s)^2.
 ANY_VELOCITY = 2.0**2 * np.eye(2)
 
 
@@ -24,13 +24,13 @@ class LearnedVelocity:
     """Velocity estimator by `TranslationNet`.
 
     Attributes:
-        limit: m/s; it sees no faster speeds.
+        limit: m/s, maximum speed that the network covers.
 
     Raises:
         InputError: no such weights, or they are for another radar.
     """
 
-    #: m, see `VelocityEstimator`: it was taught the velocity of the origin.
+    #: m, see `VelocityEstimator`: the network is trained on the velocity of the origin.
     lever = 0.0
 
     def __init__(self, radar: RadarConfig, weights: Path):
@@ -39,32 +39,32 @@ class LearnedVelocity:
         self.limit = header.grid.reach / 2
 
     @torch.inference_mode()
-    def estimate(self, batch: Batch, asked: Bool[np.ndarray, "frame"] | None = None) -> Velocities:
-        """Velocities of the next frames, or of those that are asked for; no echoes are counted."""
-        told = ~batch.aliases.any(axis=1)  # it was taught speeds that do not alias
-        if asked is not None:
-            told &= asked
+    def estimate(self, batch: Batch, requested: Bool[np.ndarray, "frame"] | None = None) -> Velocities:
+        """Return the velocities of the next frames, or of the requested ones only; inliers are zero."""
+        measured = ~batch.aliases.any(axis=1)  # the network is trained on speeds without aliasing
+        if requested is not None:
+            measured &= requested
         velocity = np.zeros((len(batch), 2))
         covariance = np.tile(ANY_VELOCITY, (len(batch), 1, 1))
         self._windows.announce(partial(batch.maps, self._windows.maps), batch.stamps)
-        if told.any():
+        if measured.any():
             (shown,) = self._windows.wanted()
-            told &= shown.whole
-        if told.any():
-            mean, spread = self._net.estimate(shown.maps[told])
-            velocity[told], covariance[told] = mean.double().numpy(), spread.double().numpy()
-        return Velocities(velocity, covariance, np.zeros(len(batch), int), told)
+            measured &= shown.whole
+        if measured.any():
+            mean, spread = self._net.estimate(shown.maps[measured])
+            velocity[measured], covariance[measured] = mean.double().numpy(), spread.double().numpy()
+        return Velocities(velocity, covariance, np.zeros(len(batch), int), measured)
 
 
 class LearnedRotation:
-    """Rotation estimator by `RotationNet`: turns over several spacings, reconciled by a filter.
+    """Rotation estimator by `RotationNet`: yaw increments over several frame spacings, fused by a smoother.
 
-    The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
-    one Gaussian state (`FixedLagSmoother`), which goes on at its rate where frames are lost.
+    The paper sums the increments of one spacing in interleaved chains, which drift apart. Here the yaws of the last
+    frames are states of a `FixedLagSmoother`, which predicts with the yaw rate where frames are lost.
 
     Attributes:
         lag: see `RotationEstimator`.
-        spacings: the radar's frames over which turns are measured, ascending.
+        spacings: spacings of the increments, in frames of the radar, ascending.
     """
 
     lag = LAG
@@ -72,45 +72,46 @@ class LearnedRotation:
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
         settings = settings or TurnConfig()
         self._net, header = compiled(weights, RotationNet, radar)
-        known = header.spacings
-        self._windows = header.windows(radar, RotationNet.maker, [s for s in settings.spacings if s in known] or known)
+        trained = header.spacings
+        spacings = [s for s in settings.spacings if s in trained] or trained
+        self._windows = header.windows(radar, RotationNet.maker, spacings)
         self.spacings = self._windows.spacings
         size = self.spacings[-1] + 1
         self._longest = (size - 0.5) * radar.frame_period
-        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
+        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of the last `size` frames
         self._yaws = FixedLagSmoother(size, settings.wander, settings.fastest)
-        self._alike = settings.alike
+        self._inflation = settings.alike
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
-        """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
+        """Return the yaw increments of the next frames; their variances add up to that of the yaw since the start."""
         times = batch.centers
         before = self._times[-1] if len(self._times) else times[0]
         turns, back = self.turns(batch, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i, dt in enumerate(np.diff(times, prepend=before)):
-            last, known = self._yaws.values[-1], self._yaws.covariance[-2, -2]
+            last, variance = self._yaws.values[-1], self._yaws.covariance[-2, -2]
             self._yaws.predict(float(dt))
             if dt > self._longest:
-                # What comes after a gap does say how fast the sensor may have turned within; but that would be told as
-                # a turn of a later frame.
-                self._yaws.part()
+                # Measurements after a gap would also correct the yaw increment of the gap, but that correction would
+                # appear as an increment of a later frame. So the filter forgets the correlation with earlier frames.
+                self._yaws.decouple()
             for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
                 self._yaws.add_relative_motion(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last
-            growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
-        told = (back > 0).any(axis=0)
-        growth[told] *= self._alike
-        return Rotations.independent(yaw, growth, told)
+            growth[i] = max(self._yaws.covariance[-2, -2] - variance, 1e-8)
+        measured = (back > 0).any(axis=0)
+        growth[measured] *= self._inflation
+        return Rotations.independent(yaw, growth, measured)
 
     @torch.inference_mode()
     def turns(
         self, batch: Batch, velocities: Velocities
     ) -> tuple[Float[np.ndarray, "spacing frame 2"], Int[np.ndarray, "spacing frame"]]:
-        """What the network says of the next frames.
+        """Return the yaw increments that the network estimates for the next frames.
 
         Returns:
-            Turns (rad) over each spacing until them, and variances; NaN where frames are missing in between.
-            From how many frames ago; 0 where frames are missing.
+            Yaw increments (rad) over each spacing and their variances (rad^2); NaN where a window lacks frames.
+            Number of frames that each increment spans; 0 where a window lacks frames.
         """
         windows = self._windows.push(batch.maps(self._windows.maps), batch.stamps)
         whole = np.stack([shown.whole for shown in windows])
@@ -126,11 +127,11 @@ class LearnedRotation:
     def _travel(
         self, times: np.ndarray, velocities: np.ndarray, back: np.ndarray
     ) -> Float[np.ndarray, "spacing frame 2"]:
-        """What `RotationNet` wants to be told of windows that began so many frames ago."""
+        """Displacement over each window from the velocities, an input of `RotationNet`."""
         kept = 1 - len(self._yaws.values)
         self._times = np.concatenate([self._times[kept:], times])
         self._velocities = np.concatenate([self._velocities[kept:], velocities])
         newest = np.arange(len(self._times) - len(times), len(self._times))
         first = newest - back
-        lasting = self._times[newest] - self._times[first]
-        return lasting[..., None] * (self._velocities[newest] + self._velocities[first]) / 2
+        duration = self._times[newest] - self._times[first]
+        return duration[..., None] * (self._velocities[newest] + self._velocities[first]) / 2

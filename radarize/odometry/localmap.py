@@ -1,25 +1,26 @@
-"""A grid of what the last frames looked like around the sensor, against which the next one is laid."""
+"""Local map: a grid of the contrast around the sensor in the last frames, with which the next frame is matched."""
 
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32
 from numba import njit
-from scipy.ndimage import shift as moved
+from scipy.ndimage import shift
 
-#: m, by how far the sensor may be off the grid's middle.
-_OFF_MIDDLE = 1.0
-#: Cells along a side of the map: what a frame takes does not grow with how far the radar sees.
-_MOST = 640
+#: Maximum distance of the sensor from the centre of the grid, m.
+_MAX_OFFSET = 1.0
+#: Maximum number of cells along a side: it bounds the computing time of a frame, however long the range of the radar
+#: is.
+_MAX_CELLS = 640
 
 
 class View(NamedTuple):
-    """A frame as the map sees it.
+    """A frame in polar coordinates.
 
     Attributes:
         feature: (range, azimuth) contrast, dB.
         ranges: of rows, m, evenly spaced.
-        sines: of the columns' azimuths, evenly spaced and symmetric.
+        sines: of the azimuths of columns, evenly spaced and symmetric.
     """
 
     feature: Float32[np.ndarray, "range azimuth"]
@@ -28,7 +29,7 @@ class View(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Cells of a map: mean of what was seen there, how often it was, and the cells' side, m."""
+    """Cells of a map: running mean, number of frames in it, and side of a cell (m)."""
 
     mean: Float32[np.ndarray, "x y"]
     count: Float32[np.ndarray, "x y"]
@@ -36,47 +37,47 @@ class Grid(NamedTuple):
 
 
 class LocalMap:
-    """A map as large as the sensor sees, which moves along with it.
+    """Map of the surroundings, centred on the sensor.
 
     Args:
-        reach: m, the farthest range.
-        cell: m, least side of a cell; so many cells as there may be cover what a radar of coarse range sees in larger
-            ones, which its range cells are anyway.
+        reach: m, maximum range.
+        cell: m, side of a cell; larger for radars whose range exceeds `_MAX_CELLS` cells of this size.
     """
 
     def __init__(self, reach: float, cell: float):
-        cell = max(cell, 2 * (reach + 2 * _OFF_MIDDLE) / _MOST)
-        side = 2 * int((reach + 2 * _OFF_MIDDLE) / cell)
+        cell = max(cell, 2 * (reach + 2 * _MAX_OFFSET) / _MAX_CELLS)
+        side = 2 * int((reach + 2 * _MAX_OFFSET) / cell)
         self._grid = Grid(*np.zeros((2, side, side), np.float32), cell)
 
     def correlate(
         self, view: View, positions: Float[np.ndarray, "yaw 2"], yaws: Float[np.ndarray, "yaw"]
     ) -> tuple[Float[np.ndarray, "yaw"], Float[np.ndarray, "yaw"]]:
-        """Correlation (-1...1) of a frame with the map, seen at each yaw from its position (m), and how much of the
-        frame's area (0...1) the map knows there."""
+        """Return the normalised correlation (-1...1) of a frame with the map at each yaw and its position (m), and the
+        share (0...1) of the frame's area that the map covers there."""
         return _correlate(view, self._grid, positions, yaws)
 
     def blend(self, view: View, position: Float[np.ndarray, "2"], yaw: float, share: float) -> None:
-        """A frame joins the map: where it had been seen often, the frame's share of the cell's mean is `share`."""
+        """Blend a frame into the map, with a weight of at least `share` in the running mean of each cell."""
         _blend(view, self._grid, position, yaw, share)
 
-    def follow(self, position: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-        """Keep the sensor in the map's middle; its position after that. What leaves the map is forgotten."""
+    def recenter(self, position: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+        """Shift the map such that the sensor is near its centre; returns the position after that. Cells outside of the
+        map are discarded."""
         cell = self._grid.cell
         steps = np.rint(position / cell).astype(int)
-        if np.abs(steps).max() * cell <= _OFF_MIDDLE:
+        if np.abs(steps).max() * cell <= _MAX_OFFSET:
             return position
-        self._grid = Grid(*(moved(each, -steps, order=0) for each in self._grid[:2]), cell)
+        self._grid = Grid(*(shift(each, -steps, order=0) for each in self._grid[:2]), cell)
         return position - steps * cell
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Discard the map."""
         self._grid.mean[:] = self._grid.count[:] = 0.0
 
 
 @njit(cache=True, fastmath=True)
 def _correlate(view, grid, positions, yaws):
-    """Normalised correlation of a polar map with the grid, and their overlap; cells weigh by area."""
+    """Normalised correlation of a polar map with the grid, weighted by the area of polar cells, and their overlap."""
     (feature, ranges, sines), (mean, count, cell) = view, grid
     side = mean.shape[0]
     correlation, overlap = np.zeros(len(yaws)), np.zeros(len(yaws))
@@ -117,7 +118,7 @@ def _correlate(view, grid, positions, yaws):
 
 @njit(cache=True, fastmath=True)
 def _blend(view, grid, position, yaw, least):
-    """Running mean of polar maps on the grid; a cell's newest value weighs 1/count, but no less than `least`."""
+    """Running mean of polar maps on the grid; the weight of a new value is 1/count, at least `least`."""
     (feature, ranges, sines), (mean, count, cell) = view, grid
     side, (rows, columns) = mean.shape[0], feature.shape
     nearest, spacing, field = ranges[0], ranges[1] - ranges[0], sines[-1]

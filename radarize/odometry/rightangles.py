@@ -1,4 +1,4 @@
-"""Directions of walls: most of a building's stand at right angles, or in a few directions."""
+"""Directions of walls: most walls of a building are at right angles, or have a few directions."""
 
 from collections.abc import Sequence
 
@@ -7,33 +7,33 @@ from jaxtyping import Float
 
 from radarize.io.pose import wrap
 
-#: Walls that a new direction counts for; probability from which on a wall has one that is known.
-_NEW, _CERTAIN = 0.5, 0.9
+#: Weight of a new direction, in walls; minimum probability for a wall to be associated with a known direction.
+_NEW_WEIGHT, _MIN_PROBABILITY = 0.5, 0.9
 
 
-def past_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[np.ndarray, "*any"]:
-    """Angles (rad) less the nearest multiple of a right one: within pi/4 of 0."""
+def from_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[np.ndarray, "*any"]:
+    """Deviation of angles (rad) from the nearest multiple of a right angle, within +-pi/4."""
     return wrap(4 * angle) / 4
 
 
-def recognised(
-    off: Float[np.ndarray, "direction"],
+def associate_direction(
+    deviations: Float[np.ndarray, "direction"],
     variances: float | Float[np.ndarray, "direction"],
     walls: Sequence[int],
 ) -> int | None:
-    """Which direction a wall has, weighed as in a Chinese restaurant process (Aldous, 1985): a known one by how many
-    walls had it and how well it fits, a new one by a constant.
+    """Associate a wall with one of the known directions, as in a Chinese restaurant process (Aldous, 1985): the weight
+    of a known direction is its number of walls times the likelihood, the weight of a new one is a constant.
 
     Args:
-        off: by which the wall is past each known direction or a right angle to it, rad.
-        variances: of that, rad^2.
-        walls: how many had it.
+        deviations: of the wall from each known direction or a right angle to it, rad.
+        variances: of the deviations, rad^2.
+        walls: number of walls associated with each direction so far.
 
     Returns:
-        The direction's number; as many as there are for a new one; None where it is in doubt.
+        The index of the direction, or the number of directions if the wall has a new one; None if it is ambiguous.
     """
-    likely = np.array(walls) * np.exp(-(off**2) / variances / 2) / np.sqrt(2 * np.pi * variances)
-    share = likely / (likely.sum() + _NEW / (np.pi / 2))
-    if share.max(initial=0.0) > _CERTAIN:
-        return int(share.argmax())
-    return len(walls) if share.sum() < 0.5 else None
+    likelihood = np.array(walls) * np.exp(-(deviations**2) / variances / 2) / np.sqrt(2 * np.pi * variances)
+    probability = likelihood / (likelihood.sum() + _NEW_WEIGHT / (np.pi / 2))
+    if probability.max(initial=0.0) > _MIN_PROBABILITY:
+        return int(probability.argmax())
+    return len(walls) if probability.sum() < 0.5 else None

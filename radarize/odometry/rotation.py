@@ -1,21 +1,23 @@
-"""Yaw from range-azimuth maps, by matching each frame against a sliding local map of the frames before it.
+"""Yaw from range-azimuth maps: each frame is matched with a local map that accumulates the previous frames.
 
-Pairs of frames force a choice: close together they measure every increment with the noise of one match, far apart they
-lose their overlap in turns. A local map that forgets slowly has both spacings at once. Each frame is laid into the map
-at a fan of yaws around the predicted one, each at the position to which the velocities then lead; the best correlation
-marks its yaw, and the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
+Matching pairs of frames forces a choice of their spacing: pairs of consecutive frames add the noise of one match per
+frame, and pairs far apart lose their overlap in turns. A local map with exponential forgetting has the advantages of
+both. Each frame is correlated with the map at a fan of yaws around the prediction. The position for each yaw follows
+from the velocities. The frame is blended into the map at the yaw with the highest correlation. As long as landmarks
+stay in view, errors do not accumulate.
 
-What the map says joins what bearings of strong echoes and walls that are met again say (`radarize.odometry.bearings`)
-in one filter: of the heading, its rate, the angle at which the map lies, and what of echoes and walls is not known.
+One filter fuses this match with the bearings of strong echoes and with wall directions that are observed again
+(`radarize.odometry.bearings`). Its states are the heading, the yaw rate, the yaw error of the map, and the unknowns of
+tracked echoes and walls.
 
-Three things decide what a frame looks like to the matcher (`MapRotation.features`):
+`MapRotation.features` computes the input of the match:
 
-- A wall's specular flash is no landmark: it follows the foot of the perpendicular as the sensor passes. It is 40 dB
-  above the wall's own texture, so the spectrum is limited per range-Doppler cell, and the streaks it leaves over range
-  and azimuth are taken out by their medians.
-- Capon's ridges are sharper than windowed sums by far, and so is the match.
-- u_y = sin(azimuth) cos(elevation): what lies above and below seems nearer to the middle than it is. Elevations
-  measured per cell are too unsure to help, and one factor for all sines (`RotationConfig.stretch`) gains nothing in
+- A wall's specular reflection is no landmark: it is at the foot of the perpendicular, which moves along the wall with
+  the sensor. It is 40 dB above the wall's texture, so the power per range-Doppler cell is limited, and the streaks that
+  it leaves over range and azimuth are removed by subtracting medians.
+- Capon's beamformer has a narrower main lobe than the windowed sum, and yields sharper matches.
+- As u_y = sin(azimuth) cos(elevation), echoes from above and below appear nearer to boresight. Measured elevations per
+  cell are too noisy to correct this. A common factor for all sines (`RotationConfig.stretch`) gains nothing in
   furnished rooms.
 """
 
@@ -28,53 +30,54 @@ from torch.nn.functional import avg_pool1d
 
 from radarize.io.plain import Frozen, setting
 from radarize.io.pose import compose
-from radarize.odometry.bearings import YAW, Bearings
+from radarize.odometry.bearings import YAW, BearingTracker
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
-from radarize.odometry.smoother import Gaussian, wandered
+from radarize.odometry.smoother import Gaussian, random_walk_covariance
 from radarize.signal.batch import Batch
 from radarize.signal.heatmaps import Heatmaps
 
-#: Range and Doppler bins at most: what a frame takes is bounded for every chirp that the chip can send.
-_RANGES, _SPEEDS = 256, 64
-#: Half widths of the high-pass over range bins and azimuth columns.
+#: Maximum number of range and Doppler bins: it bounds the computing time of a frame for every chirp configuration.
+_MAX_RANGES, _MAX_DOPPLER_BINS = 256, 64
+#: Half widths of the high-pass filter, in range bins and azimuth columns.
 _TEXTURE = (12, 12)
-#: Of the predicted yaw's standard deviations, how many are searched to either side.
+#: Half width of the search, in standard deviations of the predicted yaw.
 _SIGMAS = 3.0
-#: Cells of a frame that speak independently of the others. Of those that the map knows, a correlation c is so much
-#: likelier for a match than by chance: (1 - c^2)^(-cells / 2).
-_INDEPENDENT = 50
-#: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
-_ASTRAY = np.radians(45.0)
-#: rad^0.5: what a heading is off by that nothing takes back, for what it has turned: 0.6 degrees a quarter turn. A
-#: sensor that stands or goes straight hardly drifts (chosen on the walks of `benchmark.choices.CLAIMS`).
+#: Number of independent cells of a frame. For those that the map covers, the likelihood ratio of a match with
+#: correlation c to a match by chance is (1 - c^2)^(-cells / 2).
+_INDEPENDENT_CELLS = 50
+#: Maximum standard deviation of the predicted yaw relative to the map, rad; above it the map is discarded.
+_MAX_MAP_YAW_STD = np.radians(45.0)
+#: Heading drift that is never corrected, rad per root rad of turning (rad^0.5): 0.6 deg per quarter turn. A sensor that
+#: stands or goes straight hardly drifts (chosen on the tuning set for covariances,
+#: `radarize.evaluation.benchmark.choices`).
 _DRIFT = 0.0086
-#: m to either side of a wall's flash, where it hides the rest.
-_RING = 0.1
-#: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
+#: Distance from a wall's specular reflection within which it masks other echoes, m.
+_SPECULAR_WIDTH = 0.1
+#: `RotationEstimator.lag` of estimators that do not estimate it.
 LAG = 0.2
-#: `Rotations` of the first frame of all.
-_FIRST = (0.0, 0.0, True, 1.0, 0.0)
-#: Places in the filter of the turning rate, and of the angle at which the map lies.
+#: Fields of `Rotations` for the first frame of a recording.
+_FIRST_FRAME = (0.0, 0.0, True, 1.0, 0.0)
+#: Indices of the yaw rate and of the yaw error of the map in the state of the filter.
 _RATE, _MAP = 1, 2
 
 
 @dataclass(frozen=True)
 class Rotations:
-    """Yaw increments, one per frame, from the burst centre of the frame before to this frame's.
+    """Yaw increments, one per frame, from the burst centre of the previous frame to this frame's.
 
-    Their errors are those of `radarize.odometry.uncertainty.ErrorModel`: of the heading, which are corrected later, and
-    noise that nothing corrects.
+    Their errors follow `radarize.odometry.uncertainty.ErrorModel`: an error of the heading, which later measurements
+    correct, and noise that is never corrected.
 
     Attributes:
         yaw: (frame,) rad, positive to the left; zero for the very first frame.
-        noise: (frame,) rad^2, variance of what each turn adds.
-        seen: (frame,) False where nothing was measured of it: the turn is what went before, or what a network makes of
-            next to no echoes, which may be off by all that the sensor turned.
-        correlation: (frame,) share of the heading's error before that goes on.
-        variance: (frame,) rad^2, of the heading's error at the frame.
+        noise: (frame,) rad^2, variance of the noise that each increment adds.
+        seen: (frame,) False where the yaw increment is unobservable: it is then a prediction, or the output of a
+            network without usable input.
+        correlation: (frame,) share of the previous heading error that persists.
+        variance: (frame,) rad^2, variance of the heading error at the frame.
     """
 
     yaw: Float[np.ndarray, "frame"]
@@ -87,7 +90,7 @@ class Rotations:
     def independent(
         cls, yaw: Float[np.ndarray, "frame"], noise: Float[np.ndarray, "frame"], seen: Bool[np.ndarray, "frame"]
     ) -> "Rotations":
-        """Turns whose errors are independent."""
+        """Yaw increments with independent errors."""
         return cls(yaw, noise, seen, np.ones(len(yaw)), np.zeros(len(yaw)))
 
 
@@ -142,12 +145,13 @@ class RotationConfig(Frozen):
 class MapRotation:
     """Rotation estimator with a local map; frames are pushed in order, in batches of any size.
 
-    The pose inside the local map is a running one: x, y from the velocities, yaw and turning rate from a filter whose
-    rate is a random walk, which the matches correct; or, where another estimator says how far the sensor has turned,
-    by that. Yaws are searched as far as the filter is unsure of its own; where it knows nothing, the map starts anew.
+    The position in the map is integrated from the velocities. Yaw and yaw rate are states of a filter: the rate is a
+    random walk, and matches are measurements of the yaw. If a prior estimator is given, its yaw increments replace the
+    prediction by the rate. The search width follows the covariance of the filter. Where the yaw is unobservable, the
+    map is discarded.
 
     Args:
-        prior: estimator of turns, to start the search from.
+        prior: estimator of yaw increments, used as the prediction.
 
     Attributes:
         lag: see `RotationEstimator`.
@@ -160,23 +164,25 @@ class MapRotation:
         self._sines = np.linspace(-s.field, s.field, s.columns)
         self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
-        self._bearing_sines = s.stretch * self._sines  # sines of where the cells lie
-        self._ranges = heatmaps.ranges[:_RANGES][self._first :]
+        self._bearing_sines = s.stretch * self._sines  # true sines of azimuth of the columns
+        self._ranges = heatmaps.ranges[:_MAX_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
         self._state = Gaussian(np.array([0.0, s.fastest**2, 0.0]))
-        self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state, s.right_angles)
+        self._echoes = Echoes(heatmaps, self._first)
+        self._bearings = BearingTracker(heatmaps, self._state, s.right_angles)
         self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
-        self._start = self._way = np.zeros(3)  # pose before the last step, on its mean heading, and the step
+        # The last step, and the pose before it, with the mean heading of the step.
+        self._step_start = self._step_motion = np.zeros(3)
         self._prior = prior
 
     def features(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> Float32[np.ndarray, "frame r a"]:
-        """Contrast of the Capon map, dB over the surroundings."""
+        """Return the contrast of the Capon map, dB over the surroundings."""
         s = self.settings
-        limited = self._heatmaps.limited(_essence(spectrum[:, :_RANGES]), s.limit)
+        limited = self._heatmaps.limited(_reduce_doppler(spectrum[:, :_MAX_RANGES]), s.limit)
         capon = self._heatmaps.range_azimuth_of(limited, "capon")[:, self._first :]
         floor = capon.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
         level = 10 * torch.log10((capon / floor).clamp_min(1))
@@ -187,12 +193,12 @@ class MapRotation:
         return (level - surroundings).contiguous().numpy()
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> list[list[Echo]]:
-        """The strongest of each frame."""
-        return [self._echoes.of(cells) for cells in spectrum[:, :_RANGES].numpy()]
+        """Return the strongest echoes of each frame."""
+        return [self._echoes.of(cells) for cells in spectrum[:, :_MAX_RANGES].numpy()]
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
-        """Yaw increments of the next frames, given their velocities."""
-        told = None if self._prior is None else self._doubted(self._prior.estimate(batch, velocities))
+        """Return the yaw increments of the next frames, given their velocities."""
+        prior = None if self._prior is None else self._inflated(self._prior.estimate(batch, velocities))
         turns = []
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
         for i, (feature, echoes) in enumerate(shown):
@@ -200,78 +206,79 @@ class MapRotation:
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
             if self._time is None:
-                turns.append(_FIRST)
+                turns.append(_FIRST_FRAME)
             else:
-                turn = None if told is None else (told.yaw[i], told.noise[i])
-                turns.append(self._turn(view, time, dt, velocity, turn, echoes))
-            self._join(view, -np.expm1(-dt / self.settings.memory))
+                turn = None if prior is None else (prior.yaw[i], prior.noise[i])
+                turns.append(self._step(view, time, dt, velocity, turn, echoes))
+            self._blend(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
-        yaw, noise, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
-        return Rotations(yaw, noise, seen.astype(bool), *lasting)
+        yaw, noise, seen, *heading_error = np.array(turns, float).reshape(-1, len(_FIRST_FRAME)).T
+        return Rotations(yaw, noise, seen.astype(bool), *heading_error)
 
-    def _doubted(self, told: Rotations) -> Rotations:
-        """What a network says; where frames are missing none has spoken, but what is known of how turning rates
-        wander."""
-        return replace(told, noise=np.where(told.seen, self.settings.doubt, 1.0) * told.noise)
+    def _inflated(self, prior: Rotations) -> Rotations:
+        """Rotations of the network with inflated variance. Frames without network output keep the variance of the
+        random walk."""
+        return replace(prior, noise=np.where(prior.seen, self.settings.doubt, 1.0) * prior.noise)
 
-    def _turn(
+    def _step(
         self,
         view: View,
         time: float,
         dt: float,
         velocity: Float[np.ndarray, "2"],
-        told: tuple[float, float] | None,
+        prior: tuple[float, float] | None,
         echoes: list[Echo],
     ) -> tuple[float, float, bool, float, float]:
-        """`Rotations` of a frame `dt` s after the last one."""
+        """Fields of `Rotations` for a frame `dt` s after the previous one."""
         state, mean = self._state, (self._velocity + velocity) / 2
-        start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
+        start, previous_yaw, before = state.mean[YAW], self._map_yaw, state.covariance[YAW, YAW]
         state.remember(YAW)
-        self._predict(dt, told)
-        self._bearings.move(dt, mean)
-        seen = self._bearings.see(time, echoes, velocity)
-        self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
-        self._position = self._seen_from(0.0)
+        self._predict(dt, prior)
+        self._bearings.predict(dt, mean)
+        seen = self._bearings.update(time, echoes, velocity)
+        self._step_start = np.array([*self._position, (previous_yaw + self._map_yaw) / 2])
+        self._step_motion = np.array([*(dt * mean), 0.0])
+        self._position = self._position_at(0.0)
         seen = self._match(view) or seen
         variance, turned = state.covariance[YAW, YAW], state.mean[YAW] - start
         drift = _DRIFT**2 * abs(turned) if seen else self.settings.unseen**2 * dt
-        # The part of this error that the one before explains: regression of the filter's errors on each other.
-        correlation = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
+        # Share of the heading error that the previous one explains: regression of the errors of the filter.
+        correlation = max(state.cross_covariance[YAW] / before, 0.0) if before > 0 else 1.0
         return turned, drift, seen, correlation, variance
 
     @property
-    def _laid(self) -> float:
-        """Yaw in the map."""
+    def _map_yaw(self) -> float:
+        """Yaw relative to the map, rad."""
         return float(self._state.mean[YAW] - self._state.mean[_MAP])
 
-    def _predict(self, dt: float, told: tuple[float, float] | None) -> None:
-        """Yaw and rate `dt` s later: by the rate, or by what another estimator says of the turn and its variance."""
+    def _predict(self, dt: float, prior: tuple[float, float] | None) -> None:
+        """Predict yaw and rate `dt` s later, by the rate or by a prior yaw increment and its variance."""
         state, known = self._state, self._state.covariance[YAW, YAW]
-        if told is None:
+        if prior is None:
             state.replace(YAW, state.row({YAW: 1.0, _RATE: dt}))
-            state.covariance[: _RATE + 1, : _RATE + 1] += wandered(self.settings.wander, dt)
+            state.covariance[: _RATE + 1, : _RATE + 1] += random_walk_covariance(self.settings.wander, dt)
         else:
-            state.mean[YAW] += told[0]
-            state.covariance[YAW, YAW] += told[1]
-        if state.covariance[YAW, YAW] - known > np.pi**2:  # any heading; larger numbers would only cost digits
+            state.mean[YAW] += prior[0]
+            state.covariance[YAW, YAW] += prior[1]
+        if state.covariance[YAW, YAW] - known > np.pi**2:  # unobservable; a larger variance only loses precision
             state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
             state.covariance[YAW, YAW] = known + np.pi**2
 
-    def _join(self, view: View, share: float) -> None:
-        """A frame joins the map, which then lies as far wrong as its frames do on average."""
-        self._position = self._map.follow(self._position)
-        self._map.blend(view, self._position, self._laid, share)
-        lies = self._state.mean[_MAP]
+    def _blend(self, view: View, share: float) -> None:
+        """Blend a frame into the map. The yaw error of the map becomes the weighted mean of its frames' errors."""
+        self._position = self._map.recenter(self._position)
+        self._map.blend(view, self._position, self._map_yaw, share)
+        map_yaw = self._state.mean[_MAP]
         self._state.replace(_MAP, self._state.row({YAW: share, _MAP: 1 - share}))
-        self._state.mean[_MAP] = lies  # where the frame was laid is no news
+        self._state.mean[_MAP] = map_yaw  # blending is no measurement of the map yaw
 
     def _match(self, view: View) -> bool:
-        """Correct the filter by how the frame lies in the map, and say whether that is known."""
-        for flash in self._bearings.flashes:  # no landmarks: they slide along walls as the sensor does
-            view.feature[np.abs(self._ranges - flash) < _RING] = 0.0
+        """Correct the filter by the match of the frame with the map; False if no match is accepted."""
+        for distance in self._bearings.specular_ranges:  # no landmarks: they move along walls with the sensor
+            view.feature[np.abs(self._ranges - distance) < _SPECULAR_WIDTH] = 0.0
         row = self._state.row({YAW: 1.0, _MAP: -1.0})
         spread = np.sqrt(max(self._state.variance(row), 0.0))
-        if spread > _ASTRAY:
+        if spread > _MAX_MAP_YAW_STD:
             self._map.forget()
             self._state.replace(_MAP, self._state.row({YAW: 1.0}))
             self._state.replace(_RATE, self._state.row({}))
@@ -280,29 +287,29 @@ class MapRotation:
         offset, correlation = self._fit(view, spread)
         if correlation < self.settings.least_correlation:
             return False
-        laid = self._laid
+        previous_yaw = self._map_yaw
         self._state.update(row, offset, (self._noise / correlation) ** 2)
-        self._position = self._seen_from(self._laid - laid)
+        self._position = self._position_at(self._map_yaw - previous_yaw)
         return True
 
-    def _seen_from(self, offset: float | Float[np.ndarray, "offset"]) -> Float[np.ndarray, "*offset 2"]:
-        """Position in the map if the yaw is off by so much: the way there was taken along the mean of the headings at
-        both ends."""
-        return compose(self._start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._way)[..., :2]
+    def _position_at(self, offset: float | Float[np.ndarray, "offset"]) -> Float[np.ndarray, "*offset 2"]:
+        """Position in the map if the yaw differs by an offset (rad): the last step was taken along the mean of the
+        headings at both ends."""
+        return compose(self._step_start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._step_motion)[..., :2]
 
     def _fit(self, view: View, spread: float) -> tuple[float, float]:
-        """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
-        none."""
+        """Yaw offset (rad) with the highest posterior and its correlation; correlation 0 if the search finds no
+        peak."""
         s = self.settings
         fan = np.clip(_SIGMAS * spread, s.fan, s.widest)
 
         def correlate(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self._map.correlate(view, self._seen_from(offsets), self._laid + offsets)
+            return self._map.correlate(view, self._position_at(offsets), self._map_yaw + offsets)
 
         coarse = 3 * s.step * np.arange(-np.ceil(fan / (3 * s.step)), np.ceil(fan / (3 * s.step)) + 1)
         correlation, overlap = correlate(coarse)
-        odds = -_INDEPENDENT * overlap / 2 * np.log1p(-(np.clip(correlation, 0, 0.999) ** 2))
-        fine = coarse[np.argmax(odds - (coarse * _SIGMAS / fan) ** 2 / 2)] + s.step * np.arange(-4, 5)
+        log_likelihood = -_INDEPENDENT_CELLS * overlap / 2 * np.log1p(-(np.clip(correlation, 0, 0.999) ** 2))
+        fine = coarse[np.argmax(log_likelihood - (coarse * _SIGMAS / fan) ** 2 / 2)] + s.step * np.arange(-4, 5)
         correlation, _ = correlate(fine)
         best = int(np.argmax(correlation))
         if not 0 < best < len(fine) - 1:
@@ -311,15 +318,16 @@ class MapRotation:
         return float(fine[best] + s.step * np.clip(vertex(left, peak, right), -1, 1)), float(peak)
 
 
-def _essence(spectrum: torch.Tensor) -> torch.Tensor:
-    """Of so many neighbouring Doppler bins that few enough are left, the strongest at each range."""
-    together = -(-spectrum.shape[2] // _SPEEDS)
-    if together == 1:
+def _reduce_doppler(spectrum: torch.Tensor) -> torch.Tensor:
+    """Reduce the Doppler axis to at most `_MAX_DOPPLER_BINS`: the strongest of each group of neighbouring bins, per
+    range."""
+    group = -(-spectrum.shape[2] // _MAX_DOPPLER_BINS)
+    if group == 1:
         return spectrum
-    count = spectrum.shape[2] // together
-    groups = spectrum[:, :, : count * together].unflatten(2, (count, together))
-    few = torch.view_as_real(groups[..., :4].contiguous())  # all antennas see much the same power
-    strongest = few.square().sum(dim=(-1, -2)).argmax(dim=3)[..., None, None]
+    count = spectrum.shape[2] // group
+    groups = spectrum[:, :, : count * group].unflatten(2, (count, group))
+    subset = torch.view_as_real(groups[..., :4].contiguous())  # power is nearly equal at all antennas
+    strongest = subset.square().sum(dim=(-1, -2)).argmax(dim=3)[..., None, None]
     return groups.take_along_dim(strongest, dim=3).squeeze(3)
 
 

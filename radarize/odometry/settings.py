@@ -22,7 +22,7 @@ class FusionConfig(Frozen):
 
 
 class TurnConfig(Frozen):
-    """Turns by the network over several spacings (`radarize.odometry.learned`)."""
+    """Yaw increments by the network over several frame spacings (`radarize.odometry.learned`)."""
 
     spacings: tuple[int, ...] = setting(
         (1, 2, 4), "spacings over which turns are measured; of these, the ones that the network was trained on",

@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Bool
 from pydantic import BaseModel
 
-from radarize.odometry.blindness import BLINK, Blindness, Finite, Spans
+from radarize.odometry.observability import SHORTEST, Finite, Observability, Spans
 from radarize.pipeline.pipeline import Result
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
@@ -46,7 +46,7 @@ class Health:
     """
 
     def __init__(self, radar: RadarConfig):
-        self.radar, self.blindness, self._fastest = radar, Blindness(radar.frame_period), Aliases(radar).fastest
+        self.radar, self.blindness, self._fastest = radar, Observability(radar.frame_period), Aliases(radar).fastest
         self._spans: dict[tuple[str, str], Spans] = {}  # by kind and advice
         self._first = self._last = np.nan
         self._aliased, self._far = ("aliased", self._too_fast()), ("out of reach", self._out_of_reach())
@@ -64,7 +64,7 @@ class Health:
             spans = self._spans.setdefault(key, Spans())
             for k in np.flatnonzero(there):
                 # What frames left out hide is not known.
-                spans.add(max(float(starts[k]), float(track.time[k]) - BLINK), float(track.time[k]), 0.0, ())
+                spans.add(max(float(starts[k]), float(track.time[k]) - SHORTEST), float(track.time[k]), 0.0, ())
         self._last = float(track.time[-1])
 
     def _conditions(self, result: Result) -> dict[tuple[str, str], Bool[np.ndarray, "frame"]]:
@@ -105,10 +105,10 @@ class Health:
             told.append(self._slow())
         for (kind, advice), spans in self._spans.items():
             if found := spans.found:
-                longest = max(found, key=lambda span: span.lasts)
+                longest = max(found, key=lambda span: span.duration)
                 start, stop = longest.start_s - self._first, longest.stop_s - self._first
                 told.append(
-                    f"{kind} for {sum(span.lasts for span in found):.1f} s, at the longest from {start:.1f} to "
+                    f"{kind} for {sum(span.duration for span in found):.1f} s, at the longest from {start:.1f} to "
                     f"{stop:.1f} s: {advice}"
                 )
         return told

@@ -1,7 +1,7 @@
-"""Which of the echoes on a bearing is the surface seen directly.
+"""Selection of one echo per bearing: the first or the strongest.
 
-Behind the first surface of a bearing everything a radar reports has been reflected at least once more, so keeping the
-first occupied cell is the echo suppression (paper, section 4.3).
+Behind the first surface on a bearing, every echo has been reflected at least once more. Selecting the first occupied
+cell is therefore the echo suppression (paper, section 4.3).
 """
 
 import numpy as np
@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 def first(
     occupied: Bool[np.ndarray, "frame range azimuth"], power: Float[np.ndarray, "frame range azimuth"]
 ) -> Float[np.ndarray, "frame azimuth"]:
-    """Fractional range bin of the first echo of every bearing, inf where there is none.
+    """Return the fractional range bin of the first echo on every bearing, inf where there is none.
 
-    An echo is a run of occupied cells; it lies at the strongest of them.
+    An echo is a run of occupied cells; its bin is that of the strongest of them.
     """
     start = occupied.argmax(axis=1)
     bins = np.arange(occupied.shape[1])[:, None]
@@ -28,19 +28,21 @@ def first(
 def strongest(
     occupied: Bool[np.ndarray, "frame range azimuth"], power: Float[np.ndarray, "frame range azimuth"]
 ) -> Float[np.ndarray, "frame azimuth"]:
-    """Fractional range bin of the strongest echo of every bearing, inf where there is none: no suppression."""
+    """Return the fractional range bin of the strongest echo on every bearing, inf where there is none: no echo
+    suppression."""
     return _peak(occupied, power, occupied.any(axis=1))
 
 
-def at(
+def bins_to_ranges(
     bins: Float[np.ndarray, "frame azimuth"], ranges: Float[np.ndarray, "range"]
 ) -> Float[np.ndarray, "frame azimuth"]:
-    """Ranges (m) of fractional bins, inf where there is none, by those of whole bins, evenly spaced."""
+    """Return the ranges (m) of fractional bins, inf where there is none; `ranges` are those of whole bins, evenly
+    spaced."""
     return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
 
 
 def _peak(candidates: np.ndarray, power: np.ndarray, seen: ArrayLike) -> np.ndarray:
-    # Vertex of the parabola through log power at the strongest cell and its two neighbours.
+    # Interpolate: vertex of the parabola through the log power of the strongest cell and its two neighbours.
     bins = power.shape[1]
     peak = np.where(candidates, power, -1.0).argmax(axis=1)
     log = np.log(np.maximum(power, 1e-30))

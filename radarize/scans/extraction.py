@@ -1,6 +1,6 @@
 """Range scans from heat maps: detection, then echo suppression, by one of several methods.
 
-A scan has one range per bearing, inf where nothing is seen. `METHODS` names the ways to get there, each a function of
+A scan has one range per bearing, inf where nothing is detected. `METHODS` lists the methods; each is a function of
 `Maps` that returns fractional range bins.
 """
 
@@ -47,14 +47,14 @@ class ScanConfig(Frozen):
 
 @dataclass(frozen=True)
 class Maps:
-    """Power maps on the scan's bearings.
+    """Power maps on the bearings of the scan.
 
     Attributes:
-        power: all elevations.
-        elevation_aware: echoes off the horizon weakened; None if the array cannot.
-        reference: all elevations, by the beamformer of `elevation_aware`.
+        power: of all elevations.
+        elevation_aware: with echoes off the horizon attenuated; None if the array cannot measure elevation.
+        reference: of all elevations, by the beamformer of `elevation_aware`.
         ranges: of the bins, m, evenly spaced.
-        config: parameters.
+        config: parameters of the detection.
     """
 
     power: Float[np.ndarray, "frame range bearing"]
@@ -65,18 +65,20 @@ class Maps:
 
     @classmethod
     def of(cls, heatmaps: Heatmaps, config: ScanConfig, powers: Sequence[np.ndarray]) -> "Maps":
-        """Of range-azimuth maps: `power` and, where they are known, the two others."""
+        """Return the maps on the bearings of the scan from range-azimuth maps: `power` and, if available, the two
+        others."""
         power, *others = (_resample(each, heatmaps.azimuths) for each in powers)
         level, reference = others or (None, power)
         return cls(power, level, reference, heatmaps.ranges, config)
 
     def scans(self, method: str) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges on `BEARINGS`, m, inf where nothing is seen, by a key of `METHODS`."""
-        return echoes.at(METHODS[method](self), self.ranges)
+        """Return the ranges on `BEARINGS`, m, inf where nothing is detected, by a key of `METHODS`."""
+        return echoes.bins_to_ranges(METHODS[method](self), self.ranges)
 
 
 def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[np.ndarray, "frame range bearing"]:
-    """Cells with an echo: above the noise, no sidelobe, not too weak for their bearing, and not too near."""
+    """Detect cells with an echo: above the noise, no sidelobe, not too weak for their bearing, and beyond the minimum
+    range."""
     config = maps.config
     noise = np.quantile(power, config.noise_quantile, axis=(1, 2), keepdims=True)
     power = power * (maps.ranges >= config.min_range)[:, None]
@@ -88,12 +90,12 @@ def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[
 
 
 def threshold(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
-    """The strongest echo of every bearing."""
+    """Return the strongest echo on every bearing."""
     return echoes.strongest(detect(maps.power, maps), maps.power)
 
 
 def cfar(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
-    """The strongest cell of every bearing that stands out from its neighbours in range and in bearing."""
+    """Return the strongest cell on every bearing that passes CFAR in range and in bearing."""
     level, cfar = 10 * np.log10(np.maximum(maps.power, 1e-30)), maps.config.cfar
     found = np.broadcast_to((maps.ranges >= maps.config.min_range)[:, None], level.shape)
     for axis in (1, 2):
@@ -102,12 +104,12 @@ def cfar(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
 
 
 def first_echo(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
-    """The first echo of every bearing."""
+    """Return the first echo on every bearing."""
     return echoes.first(detect(maps.power, maps), maps.power)
 
 
 def elevation_aware(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
-    """The first echo of every bearing after weighing down what comes from above and below."""
+    """Return the first echo on every bearing after attenuating echoes from above and below."""
     horizon = np.clip(maps.elevation_aware / np.maximum(maps.reference, 1e-30), 0, 1)
     power = maps.power * horizon**maps.config.elevation_power
     return echoes.first(detect(power, maps), power)
@@ -122,13 +124,13 @@ METHODS: dict[str, Callable[[Maps], np.ndarray]] = {
 
 
 class HeatmapScans:
-    """Scans of a stream's frames, from heat maps alone.
+    """Scan extractor from heat maps.
 
     Args:
         method: a key of `METHODS`.
 
     Raises:
-        InputError: the array has no elevation-aware maps, and the method needs them.
+        InputError: the method needs elevation-aware maps, and the array has none.
     """
 
     def __init__(self, heatmaps: Heatmaps, method: str, config: ScanConfig | None = None):
@@ -139,11 +141,11 @@ class HeatmapScans:
         self.heatmaps, self.method, self.config = heatmaps, method, config or ScanConfig()
 
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges on `BEARINGS`, m, inf where nothing is seen."""
+        """Return the scans of the next frames: ranges on `BEARINGS`, m, inf where nothing is detected."""
         maps, spectrum = self.heatmaps, batch.spectrum
         with stage("maps"):
-            # Scans want Capon's sharp beams, which in simulated offices have four of five ranges within 10 cm, against
-            # Bartlett's one of two; the horizon is told from two maps of one beamformer, Bartlett's.
+            # Capon's beamformer resolves better: in simulated offices 80 % of the ranges are within 10 cm, with
+            # Bartlett's 50 %. The suppression by elevation compares two maps of one beamformer, Bartlett's.
             powers = [maps.range_azimuth_of(spectrum, "capon").numpy()]
             if self.method == "elevation-aware":
                 powers += [maps.elevation_aware_of(spectrum).numpy(), maps.range_azimuth_of(spectrum).numpy()]
@@ -152,7 +154,7 @@ class HeatmapScans:
 
 
 def _resample(power: np.ndarray, azimuths: np.ndarray) -> np.ndarray:
-    """Power on `BEARINGS`, linear between columns, 0 outside of them; not-a-number (a lost frame) counts as 0."""
+    """Power on `BEARINGS`, interpolated linearly between columns, 0 outside of them; nan (a lost frame) counts as 0."""
     power = np.nan_to_num(np.asarray(power, float), nan=0.0, posinf=0.0)
     after = np.clip(np.searchsorted(azimuths, BEARINGS), 1, len(azimuths) - 1)
     fraction = (BEARINGS - azimuths[after - 1]) / (azimuths[after] - azimuths[after - 1])

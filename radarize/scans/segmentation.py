@@ -1,4 +1,4 @@
-"""Scans by the segmentation network: where each bearing's first surface is, if it can be told."""
+"""Scans by the segmentation network, which estimates the first surface on each bearing."""
 
 from pathlib import Path
 
@@ -14,28 +14,29 @@ from radarize.scans import echoes
 from radarize.scans.extraction import HeatmapScans
 from radarize.signal.batch import Batch
 
-#: Least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer bearings.
-LEAST = 0.7
-#: Cells to either side that count as right: 9 cm of the preset's.
-NEAR = 2
-#: Of its width, how far a column's outermost rays lie from its middle, in the label that the network learned
+#: Minimum probability that the true range is within `HALF_WIDTH` cells. A higher value leaves fewer ghosts and fewer
+#: bearings.
+MIN_PROBABILITY = 0.7
+#: Half width of the window around a range, cells: 9 cm with the preset radar.
+HALF_WIDTH = 2
+#: Distance of the outermost rays of a column from its centre, as a share of its width, in the training label
 #: (`radarsim.sensors.scan`).
-OUTERMOST = 3 / 8
-#: m: what differs by less from bearing to bearing is one surface.
-_STEP = 0.3
+EDGE_OFFSET = 3 / 8
+#: Maximum range difference between neighbouring bearings on one surface, m.
+_MAX_STEP = 0.3
 
 
 class SegmentationScans:
-    """Scans of a stream's frames.
+    """Scan extractor by the segmentation network.
 
     Args:
-        first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
+        first: return the first surface; False: the most likely occupied cell of each bearing at any range, for
             comparison.
-        beyond: scans of a radar that sees farther than the network: what they see there is taken, where the network
-            sees nothing.
+        beyond: scan extractor of a radar whose range exceeds that of the network; its echoes beyond that range are used
+            where the network detects nothing.
 
     Attributes:
-        ranges: of the network's rows, m.
+        ranges: of the rows of the network, m.
 
     Raises:
         InputError: no such weights, or they do not fit the radar.
@@ -45,25 +46,27 @@ class SegmentationScans:
         self._net, header = compiled(weights, SegmentationNet, radar)
         self._windows, self.ranges = header.windows(radar, SegmentationNet.maker), header.ranges(radar)
         self.first = first
-        assert header.grid is not None  # the network sees maps
+        assert header.grid is not None  # the input of the network is maps
         self._beyond = beyond if radar.max_range > header.grid.reach else None
 
     @torch.inference_mode()
     def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
-        """Probability that a cell holds a bearing's first surface, if nothing is before it."""
-        shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
-        likely = self._net.estimate(shown.maps)
-        assert isinstance(likely, torch.Tensor)  # the network's only answer
-        return likely.numpy()
+        """Return the probability that a cell holds the first surface of its bearing, given that the nearer cells are
+        free."""
+        window = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
+        probability = self._net.estimate(window.maps)
+        assert isinstance(probability, torch.Tensor)  # the network has one output
+        return probability.numpy()
 
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""
+        """Return the scans of the next frames: ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is
+        detected."""
         with stage("scans"):
             occupancy = self.occupancy(batch)
             if self.first:
-                near = at_middles(echoes.at(first_surface(occupancy, LEAST), self.ranges))
+                near = at_column_centers(echoes.bins_to_ranges(first_surface(occupancy, MIN_PROBABILITY), self.ranges))
             else:
-                near = echoes.at(echoes.strongest(occupancy >= LEAST, occupancy), self.ranges)
+                near = echoes.bins_to_ranges(echoes.strongest(occupancy >= MIN_PROBABILITY, occupancy), self.ranges)
         if self._beyond is None:
             return near
         far = self._beyond.extract(batch)
@@ -73,45 +76,48 @@ class SegmentationScans:
 def first_surface(
     occupancy: Float[np.ndarray, "frame range bearing"], least: float
 ) -> Float[np.ndarray, "frame bearing"]:
-    """Fractional range bin of every bearing's first surface, inf where none is likely enough."""
-    bins, probability = likeliest(occupancy)
+    """Return the fractional range bin of the first surface on every bearing, inf where its probability is below
+    `least`."""
+    bins, probability = most_likely(occupancy)
     return np.where(probability >= least, bins, np.inf)
 
 
-def at_middles(ranges: Float[np.ndarray, "frame bearing"]) -> Float[np.ndarray, "frame bearing"]:
-    """Ranges in the middle of each column, from those of its nearest ray, inf where there is none.
+def at_column_centers(ranges: Float[np.ndarray, "frame bearing"]) -> Float[np.ndarray, "frame bearing"]:
+    """Convert ranges of the nearest ray of each column to ranges at its centre, inf where there is none.
 
-    The network was taught all surfaces that a column's rays see, and the first of a wall at an angle is that of an
-    outermost ray: by `OUTERMOST` of what the range changes from column to column too near.
+    The label marks all surfaces that the rays of a column hit, so the first cell of an oblique wall is that of an
+    outermost ray. It is too near by `EDGE_OFFSET` times the change of range from column to column.
     """
     steps = np.diff(np.where(np.isinf(ranges), np.nan, ranges), axis=1)
-    same = np.abs(steps) <= _STEP
+    same = np.abs(steps) <= _MAX_STEP
     change, sides = np.zeros(ranges.shape), np.zeros(ranges.shape, int)
     for side in (np.s_[:, 1:], np.s_[:, :-1]):
         change[side] += np.where(same, steps, 0)
         sides[side] += same
-    return ranges + OUTERMOST * np.abs(change) / np.maximum(sides, 1)
+    return ranges + EDGE_OFFSET * np.abs(change) / np.maximum(sides, 1)
 
 
-def likeliest(
+def most_likely(
     occupancy: Float[np.ndarray, "frame range bearing"],
 ) -> tuple[Float[np.ndarray, "frame bearing"], Float[np.ndarray, "frame bearing"]]:
-    """Fractional range bin where every bearing's first surface is likeliest, and how likely it is that near.
+    """Return the fractional range bin of the most likely first surface on every bearing, and the probability of its
+    window.
 
-    With h the probability of a cell if nothing is before it, the first surface is in a cell with probability
-    h * product over nearer cells of (1 - h): behind a surface hardly anything is left for ghosts, which is the
-    first-echo rule in terms of probability. The answer is the mean over the likeliest 2 `NEAR` + 1 cells in a row.
+    With h the probability of a cell given that all nearer cells are free, the first surface is in that cell with
+    probability h * product over nearer cells of (1 - h). Ghosts behind a surface get almost no probability, which is
+    the first-echo rule in terms of probabilities. The result is the mean over the window of 2 `HALF_WIDTH` + 1 cells
+    with the largest probability.
     """
     free = np.cumprod(1 - occupancy, axis=1)
     here = occupancy * np.concatenate([np.ones_like(free[:, :1]), free[:, :-1]], axis=1)
-    place = here * np.arange(here.shape[1])[:, None]
-    mass, moment = (_stretches(values) for values in (here, place))
+    weighted_bins = here * np.arange(here.shape[1])[:, None]
+    mass, moment = (_window_sums(values) for values in (here, weighted_bins))
     best = mass.argmax(axis=1)[:, None]
     mass, moment = (np.take_along_axis(values, best, axis=1)[:, 0] for values in (mass, moment))
     return moment / np.maximum(mass, 1e-12), mass
 
 
-def _stretches(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:
-    """Sums over each cell and its `NEAR` neighbours to either side."""
-    total = np.cumsum(np.pad(values, ((0, 0), (NEAR + 1, NEAR), (0, 0))), axis=1)
-    return total[:, 2 * NEAR + 1 :] - total[:, : -2 * NEAR - 1]
+def _window_sums(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:
+    """Sums over each cell and its `HALF_WIDTH` neighbours to either side."""
+    total = np.cumsum(np.pad(values, ((0, 0), (HALF_WIDTH + 1, HALF_WIDTH), (0, 0))), axis=1)
+    return total[:, 2 * HALF_WIDTH + 1 :] - total[:, : -2 * HALF_WIDTH - 1]

@@ -1,7 +1,7 @@
-"""The SLAM back end: gather scans, match, build submaps, align their walls, close loops, optimise.
+"""The SLAM back end: gather scans into nodes, match them, build submaps, align walls, close loops, optimise.
 
 After Google's Cartographer (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016), on gtsam: matching runs
-in a local frame that is smooth and drifts, the graph's poses are global and jump when loops close.
+in a local frame, which is smooth and drifts; the poses of the graph are global and jump when loops close.
 """
 
 from collections import deque
@@ -15,28 +15,28 @@ from radarize.io.pose import Pose, between, carried, compose, interpolate, trans
 from radarize.odometry.uncertainty import ErrorModel
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
-from radarize.slam.drawing import Drawing
 from radarize.slam.grid import OccupancyGrid
-from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
+from radarize.slam.loops import LoopCandidate, LoopSearch, LoopVerifier, match_covariance
 from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
-from radarize.slam.odometry import FARTHEST, Drift, Odometry, Stillness
+from radarize.slam.odometry import FARTHEST, ConstantMotion, Drift, Odometry
 from radarize.slam.posegraph import PoseGraph
+from radarize.slam.rendering import MapRenderer
 from radarize.slam.rows import Rows
 from radarize.slam.submap import Submap
-from radarize.slam.trimming import needless
+from radarize.slam.trimming import redundant_submaps
 from radarize.slam.walls import Walls
 
-#: Nodes whose last loop searches may wait at a time.
-_AHEAD = 16
-#: Who has moved by less than this share of what makes a node stands.
-_STILL = 1 / 3
-#: Scans that `Slam.trajectory` takes at a time.
+#: Maximum number of nodes whose loop searches wait at the end of a session.
+_MAX_WAITING = 16
+#: The sensor stands still if it has moved by less than this share of the distance between nodes.
+_STILL_SHARE = 1 / 3
+#: Number of scans that `Slam.trajectory` processes at a time.
 _BLOCK = 4096
-#: m: standard deviation of places of which walls tell nothing.
-_ANYWHERE = 100.0
-#: Submaps that an endless session forgets at a time: the graph is then solved anew.
-_TRIM = 8
+#: Standard deviation of the unobserved position in a heading constraint from walls, m.
+_UNOBSERVED = 100.0
+#: Number of submaps that an endless session removes at a time, as the graph is then solved from scratch.
+_TRIM_BATCH = 8
 
 
 class Slam:
@@ -48,19 +48,19 @@ class Slam:
         times, poses = slam.trajectory()
         grid = slam.map()
 
-    The same input gives the same bytes: searches for loops run in threads, but what they find is taken in a fixed
-    number of nodes later (`radarize.slam.loops`).
+    The same input gives the same bytes: loops are searched in threads, but each result is used a fixed number of nodes
+    after its search began (`radarize.slam.loops`).
 
     Odometry and scans come in any interleaving: a scan waits until odometry has reached its time. Entries that are not
-    later than the one before them are left out and counted in `skipped`; scans before the first odometry entry take
-    its pose, scans after the last one the last; a jump in time is a step like any other. Empty scans and
-    such of nan alone follow odometry; no scans at all give an empty trajectory and map. Without any odometry motion is
-    taken to go on as matched before. While the sensor stands no nodes are made, and a frame takes 40 bytes.
+    later than the previous one are dropped and counted in `skipped`. Scans before the first odometry entry get its
+    pose, scans after the last one the last pose. A gap in time is a step like any other. Empty scans and scans of nan
+    follow odometry. Without any scan, trajectory and map are empty. Without any odometry, the last matched motion is
+    assumed to continue. While the sensor stands still no nodes are added, and a frame takes 40 bytes.
 
     Args:
         config: all parameters; the default is the preset ``lidar``.
-        endless: keep no trajectory, and forget what was seen of a place longest ago: memory and time then grow with the
-            ground that is covered, however often.
+        endless: keep no trajectory, and remove old submaps of places that newer ones cover: memory and time then grow
+            with the mapped area, not with the duration.
     """
 
     def __init__(self, config: SlamConfig | None = None, endless: bool = False):
@@ -72,16 +72,16 @@ class Slam:
         self.skipped = {"odometry": 0, "scans": 0}
         self._waiting: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
         self._scan_times = Rows()
-        self._newest = -np.inf  # of the times of scans
-        self._azimuths = np.zeros(0)  # of the last scan
+        self._newest = -np.inf  # time of the last scan
+        self._azimuths = np.zeros(0)  # azimuths of the last scan
         self._open: list[Scan] = []
-        self._local: list[np.ndarray] = []  # of every node in the local frame
+        self._local: list[np.ndarray] = []  # pose of every node in the local frame
         self._drift = Drift(self.config.odometry.scale)
         self._search = LoopSearch(self.config.loop)
-        self._jury = Jury(self.graph, self._drift, self.config.loop)
+        self._verifier = LoopVerifier(self.graph, self._drift, self.config.loop)
         self._walls = Walls(self.config.walls)
         self._building: list[Submap] = []
-        self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
+        self._centers: list[np.ndarray] = []  # centres of finished submaps, in the frames of their anchors
 
     def add_odometry(
         self,
@@ -89,32 +89,32 @@ class Slam:
         pose: Float[np.ndarray, "3"],
         errors: ErrorModel | Float[np.ndarray, "3 3"] | None = None,
     ) -> None:
-        """Say where odometry puts the sensor.
+        """Add a pose of odometry.
 
         Args:
             time: s.
             pose: x, y (m), yaw (rad) in any fixed frame.
-            errors: of the step since the entry before, or its covariance alone if steps are independent, for (x, y,
-                yaw) in this pose's frame (m^2, m rad, rad^2); None: as configured in `SlamConfig.odometry`.
+            errors: error model of the step since the previous entry, or its covariance if steps are independent, for
+                (x, y, yaw) in the frame of this pose (m^2, m rad, rad^2); None: as configured in `SlamConfig.odometry`.
 
         Raises:
-            InputError: a value is not finite, or not within `FARTHEST`, or the covariance is none.
+            InputError: a value is not finite or not within `FARTHEST`, or the covariance is invalid.
         """
         if self.odometry.add(time, pose, errors):
-            self._drain()
+            self._process_waiting()
         else:
             self.skipped["odometry"] += 1
 
     def add_scan(self, time: float, azimuths: Float[np.ndarray, "beam"], ranges: Float[np.ndarray, "_"]) -> None:
-        """Say what the sensor saw.
+        """Add a scan.
 
         Args:
             time: s.
             azimuths: of the beams, rad, positive to the left.
-            ranges: one for each, m; inf: nothing seen on this beam; nan: not known.
+            ranges: one for each beam, m; inf: no echo on this beam; nan: unknown.
 
         Raises:
-            InputError: the time is not finite, an azimuth not within `FARTHEST`, or the lengths differ.
+            InputError: the time is not finite, an azimuth is not within `FARTHEST`, or the lengths differ.
         """
         azimuths, ranges = np.asarray(azimuths, float), np.asarray(ranges, float)
         if not np.isfinite(time):
@@ -128,35 +128,35 @@ class Slam:
             self.skipped["scans"] += 1
             return
         if np.array_equal(azimuths, self._azimuths):
-            azimuths = self._azimuths  # kept once for all nodes
+            azimuths = self._azimuths  # one array, shared by all nodes
         self._azimuths = azimuths
         self._newest = float(time)
         if not self.endless:
             self._scan_times.append(self._newest)
         self._waiting.append((float(time), azimuths, ranges))
-        self._drain()
+        self._process_waiting()
 
     def finish(self) -> None:
-        """Process what still waits, search all loops once more from the optimised poses, and optimise."""
+        """Process the remaining scans, search all loops again from the optimised poses, and optimise."""
         if not len(self.odometry):
-            self.odometry = Stillness(self.config.odometry)
-        self._drain(final=True)
+            self.odometry = ConstantMotion(self.config.odometry)
+        self._process_waiting(final=True)
         if self._open:
             self._add_node()
         for submap in self._building:
             if 2 * len(submap.nodes) >= self.config.grid.nodes:
                 self._align(submap)
         if self.config.loop.enabled:
-            self._hear()
+            self._collect_closures()
             self.graph.optimise()
-            self._close_again()
+            self._search_loops_again()
         self.graph.optimise()
 
     def trajectory(self) -> tuple[Float[np.ndarray, "scan"], Float[np.ndarray, "scan 3"]]:
-        """Times (s) and poses (x, y, yaw) of every scan up to the last node's, in the frame in which odometry began;
-        of an endless session none.
+        """Return times (s) and poses (x, y, yaw) of every scan up to the last node, in the frame in which odometry
+        began; empty for an endless session.
 
-        Between two nodes odometry gives the shape, and the nodes its ends.
+        Between two nodes the trajectory follows odometry, corrected at its ends.
         """
         if not self.nodes or self.endless:
             return np.zeros(0), np.zeros((0, 3))
@@ -175,8 +175,8 @@ class Slam:
         return times, found
 
     def covariances(self) -> Float[np.ndarray, "scan 3 3"]:
-        """Covariance of every pose of `trajectory` for (x, y, yaw) in its own frame, given the first node: that of the
-        node next to it in time."""
+        """Return the covariance of every pose of `trajectory` for (x, y, yaw) in its own frame, given the first node:
+        that of the node nearest in time."""
         times, _ = self.trajectory()
         if not len(times):
             return np.zeros((0, 3, 3))
@@ -186,46 +186,47 @@ class Slam:
         return self.graph.covariances()[np.where(times - knots[before] <= knots[after] - times, before, after)]
 
     def warnings(self) -> list[str]:
-        """One sentence where covariances could not be solved for, or none."""
+        """Return one sentence if the covariances could not be computed, else none."""
         if self.graph.solved:
             return []
         return [
-            "the pose graph could not be solved for covariances: those of odometry alone stand in, and loops were "
-            "searched as widely as these say"
+            "the covariances of the pose graph could not be computed: those of odometry alone are used instead, also "
+            "for the search windows of loops"
         ]
 
     def map(self) -> OccupancyGrid:
-        """Occupancy grid of all nodes, drawn anew at their optimised poses."""
-        return Drawing(self.config.grid).of(self.nodes, self.graph.poses)
+        """Return the occupancy grid of all nodes, rendered at their optimised poses."""
+        return MapRenderer(self.config.grid).render(self.nodes, self.graph.poses)
 
     # --- the algorithm, step by step ---------------------------------------------------------------------------------
-    def _drain(self, final: bool = False) -> None:
+    def _process_waiting(self, final: bool = False) -> None:
         while self._waiting and (final or self.odometry.covers(self._waiting[0][0])):
             time, azimuths, ranges = self._waiting.popleft()
             scan = Scan(time, self.odometry.pose(time), azimuths, ranges)
-            if self._open and self._stands(scan):
+            if self._open and self._stands_still(scan):
                 self.odometry.release(self.nodes[-1].time, self._open[-1].time)
-                self._open = []  # the last node has seen it all
+                self._open = []  # the last node covers these scans
             elif self._open and self._moved(self._open[0], scan):
                 self._add_node()
             self._open.append(scan)
 
     def _moved(self, first: Scan, scan: Scan) -> bool:
-        return self._far(first.odometry, scan, 1.0) or scan.time - first.time >= self.config.node.duration
+        return self._is_away(first.odometry, scan, 1.0) or scan.time - first.time >= self.config.node.duration
 
-    def _stands(self, scan: Scan) -> bool:
-        """Whether nothing has moved since the last node, which lies back by more than a node's time."""
+    def _stands_still(self, scan: Scan) -> bool:
+        """Whether the sensor has not moved since the last node, for longer than the duration of a node."""
         if not self.nodes or scan.time - self._open[0].time < self.config.node.duration:
             return False
-        place = self.odometry.pose(self.nodes[-1].time)
-        return not any(self._far(place, each, _STILL) for each in (*self._open, scan))
+        pose = self.odometry.pose(self.nodes[-1].time)
+        return not any(self._is_away(pose, each, _STILL_SHARE) for each in (*self._open, scan))
 
-    def _far(self, place: np.ndarray, scan: Scan, share: float) -> bool:
-        """Whether a scan is from elsewhere, by a share of what makes a node; without odometry nobody knows."""
-        x, y, yaw = between(place, scan.odometry)
+    def _is_away(self, pose: np.ndarray, scan: Scan, share: float) -> bool:
+        """Whether a scan is farther from a pose than a share of the distance between nodes; always if there is no
+        odometry."""
+        x, y, yaw = between(pose, scan.odometry)
         c = self.config.node
-        unknown = isinstance(self.odometry, Stillness)
-        return unknown or np.hypot(x, y) >= share * c.distance or abs(yaw) >= share * c.angle
+        no_odometry = isinstance(self.odometry, ConstantMotion)
+        return no_odometry or np.hypot(x, y) >= share * c.distance or abs(yaw) >= share * c.angle
 
     def _add_node(self) -> None:
         node = Node.gather(self._open, self.config)
@@ -243,16 +244,16 @@ class Slam:
             self.graph.add_motion(len(self.nodes) - 1, len(self.nodes), motion, covariance)
             self._local.append(local)
             self._drift.add(local, covariance, float(np.hypot(motion[0], motion[1])))
-            if isinstance(self.odometry, Stillness):
+            if isinstance(self.odometry, ConstantMotion):
                 self.odometry.last = moved
         self.nodes.append(node)
         self.odometry.release(node.time, node.time)
         self._insert(len(self.nodes) - 1, node)
         if self.config.loop.enabled:
-            self._close(len(self.nodes) - 1)
+            self._search_loops(len(self.nodes) - 1)
 
     def _match(self, node: Node, predicted: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-        """Local pose of a new node: the prediction, moved to fit the older of the submaps being built."""
+        """Local pose of a new node: the prediction, corrected by a match with the older of the submaps being built."""
         c, points = self.config.matcher, node.points
         if not c.enabled or len(points) < self.config.node.min_points:
             return predicted
@@ -274,12 +275,12 @@ class Slam:
         result = match(
             submap.grid, points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
-        noise = uncertainty(result, c.translation_floor, c.rotation_floor)
+        noise = match_covariance(result, c.translation_floor, c.rotation_floor)
         self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
         return compose(self._local[submap.anchor], result.pose)
 
     def _insert(self, number: int, node: Node) -> None:
-        """Add a node to the two submaps being built; a new one starts when the older is half full."""
+        """Insert a node into the two submaps being built; a new one starts when the older is half full."""
         if len(self._building) < 2 and (
             not self._building or len(self._building[0].nodes) >= self.config.grid.nodes // 2
         ):
@@ -295,77 +296,77 @@ class Slam:
                 self._trim()
 
     def _align(self, submap: Submap) -> None:
-        """Let the walls of a submap tell the heading of the node in its middle."""
+        """Add a heading constraint from the wall directions of a submap to the node in its middle."""
         if not self.config.walls.enabled:
             return
         middle, poses = submap.nodes[len(submap.nodes) // 2], self.graph.poses
-        points = _seen(middle, self._local, {k: self.nodes[k].points for k in submap.nodes})
+        points = _points_in_frame_of(middle, self._local, {k: self.nodes[k].points for k in submap.nodes})
         if len(points) < self.config.node.min_points:
             return
-        told = self._walls.meet(middle, points, poses[:, 2], lambda *nodes: self._drift.between(*nodes)[2, 2])
-        if told is not None:
-            other, turn = told
+        parallel = self._walls.associate(middle, points, poses[:, 2], lambda *k: self._drift.between(*k)[2, 2])
+        if parallel is not None:
+            other, turn = parallel
             x, y, _ = between(poses[other], poses[middle])
-            spread = np.diag([_ANYWHERE, _ANYWHERE, np.sqrt(2) * self.config.walls.sigma]) ** 2
+            spread = np.diag([_UNOBSERVED, _UNOBSERVED, np.sqrt(2) * self.config.walls.sigma]) ** 2
             self.graph.add_match(other, middle, np.array([x, y, turn]), spread)
             self.graph.update()
 
     def _trim(self) -> None:
-        """Forget submaps of places that were shown often enough since, and the nodes that are in no other one."""
-        gone = needless(self.submaps, self.graph.poses)
-        if len(gone) < _TRIM:
+        """Remove submaps of places that newer submaps cover, and the nodes that are in no other submap."""
+        redundant = redundant_submaps(self.submaps, self.graph.poses)
+        if len(redundant) < _TRIM_BATCH:
             return
-        self._hear()
-        stay = [k for k, submap in enumerate(self.submaps) if submap not in gone]
-        self._centers = [self._centers[k] for k in stay if k < len(self._centers)]
-        self.submaps = [self.submaps[k] for k in stay]
+        self._collect_closures()
+        remaining = [k for k, submap in enumerate(self.submaps) if submap not in redundant]
+        self._centers = [self._centers[k] for k in remaining if k < len(self._centers)]
+        self.submaps = [self.submaps[k] for k in remaining]
         kept = sorted({number for submap in self.submaps for number in submap.nodes})
         self.graph.keep(kept, self._drift.between)
         self._drift.keep(kept)
-        self._jury.forget()
+        self._verifier.forget()
         self.nodes, self._local = [self.nodes[k] for k in kept], [self._local[k] for k in kept]
         place = {number: k for k, number in enumerate(kept)}
         self._walls.keep(place)
         for submap in self.submaps:
             submap.anchor, submap.nodes = place[submap.anchor], [place[number] for number in submap.nodes]
 
-    def _close(self, number: int) -> None:
-        """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""
+    def _search_loops(self, number: int) -> None:
+        """Start to search the submaps near a node, and process the results for earlier nodes."""
         c = self.config.loop
         if number % c.every == 0:
-            self._search.ask(self._questions(number, c.candidates, c.min_score, self._drift.between))
-        if self._hear(number - c.lag) or number % c.update_every == 0:
+            self._search.submit(self._loop_candidates(number, c.candidates, c.min_score, self._drift.between))
+        if self._collect_closures(number - c.lag) or number % c.update_every == 0:
             self.graph.update()
 
-    def _close_again(self) -> None:
-        """With loops closed, nodes and submaps lie where they overlap: match what was not matched.
+    def _search_loops_again(self) -> None:
+        """Search loops again from the optimised poses, which show more overlaps of nodes and submaps.
 
-        How far to look is what the graph does not know of a node, given the first one: closely where loops are closed,
-        and as widely as ever where one was missed.
+        The search window follows the marginal covariances of the graph: it is small where loops are closed, and large
+        where one was missed.
         """
         c, done = self.config.loop, set(self.graph.closures)
         near = np.diag([8 * self.config.grid.resolution / 3] * 2 + [0.03]) ** 2
-        unknown = self.graph.covariances()
+        marginals = self.graph.covariances()
 
         def spread(anchor: int, number: int) -> np.ndarray:
             motion = between(self.graph.poses[anchor], self.graph.poses[number])
-            return near + unknown[number] + carried(unknown[anchor], motion)
+            return near + marginals[number] + carried(marginals[anchor], motion)
 
         numbers = range(len(self.nodes))
-        for number in sorted({*numbers[:: max(c.nodes // 2, 1)], *numbers[-1:]}):  # a walk may close with its last node
-            questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
-            self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
-            self._hear(number - _AHEAD)  # what waits takes memory
-        self._hear()
+        for number in sorted({*numbers[:: max(c.nodes // 2, 1)], *numbers[-1:]}):  # the last node may close a loop
+            candidates = self._loop_candidates(number, 2 * c.candidates, c.final_score, spread)
+            self._search.submit([each for each in candidates if (each.submap.anchor, number) not in done])
+            self._collect_closures(number - _MAX_WAITING)  # bounds the memory of waiting searches
+        self._collect_closures()
 
-    def _hear(self, before: int | None = None) -> bool:
-        """Take in what was found for nodes up to `before`, or for all; True if poses should move for it now."""
-        return any([self._jury.hear(closure) for closure in self._search.answers(before)])
+    def _collect_closures(self, before: int | None = None) -> bool:
+        """Verify the closures found for nodes up to `before`, or for all; True if the graph should be updated now."""
+        return any([self._verifier.check(closure) for closure in self._search.results(before)])
 
-    def _questions(
+    def _loop_candidates(
         self, number: int, count: int, min_score: float, spread: Callable[[int, int], np.ndarray]
-    ) -> list[Question]:
-        """Searches of a node and those before it in the finished submaps near it, nearest first."""
+    ) -> list[LoopCandidate]:
+        """Loop candidates of the latest nodes up to a node: finished submaps near it, nearest first."""
         spacing = self.config.matcher.spacing
         first = max(number - self.config.loop.nodes + 1, 0)
         poses, ready = self.graph.poses, len(self._centers)
@@ -375,14 +376,14 @@ class Slam:
         anchors = np.array([submap.anchor for submap in self.submaps[:ready]])
         members = range(first, number + 1)
         points, fronts = (
-            thin(_seen(number, poses, part), spacing)
+            thin(_points_in_frame_of(number, poses, part), spacing)
             for part in ({k: self.nodes[k].points for k in members}, {k: self.nodes[k].fronts for k in members})
         )
         centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
-        away = np.hypot(*(centers - transform(poses[number], points.mean(axis=0))).T)
-        near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
+        distances = np.hypot(*(centers - transform(poses[number], points.mean(axis=0))).T)
+        near = np.flatnonzero((distances <= self.config.loop.radius) & ((last < first) | (anchors > number)))
         return [
-            Question(
+            LoopCandidate(
                 self.submaps[k],
                 number,
                 points,
@@ -391,12 +392,12 @@ class Slam:
                 spread(anchors[k], number),
                 min_score,
             )
-            for k in near[np.argsort(away[near], kind="stable")][:count]
+            for k in near[np.argsort(distances[near], kind="stable")][:count]
         ]
 
 
-def _seen(
+def _points_in_frame_of(
     number: int, poses: Sequence[Pose] | Float[np.ndarray, "node 3"], points: Mapping[int, Float[np.ndarray, "_ 2"]]
 ) -> Float[np.ndarray, "point 2"]:
-    """Points of several nodes as one node sees them."""
+    """Points of several nodes in the frame of one node."""
     return np.concatenate([transform(between(poses[number], poses[k]), each) for k, each in points.items()])

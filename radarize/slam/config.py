@@ -185,7 +185,7 @@ class SlamConfig(Frozen):
         """Return a preset with the values of a YAML file in their place; sections and fields as here.
 
         Raises:
-            InputError: no such preset or file, or a field that does not exist or has an impossible value.
+            InputError: no such preset or file, or a field that does not exist or has an invalid value.
         """
         return read_settings(path, cls.preset(preset), "sections with fields, such as grid: {nodes: 10}")
 
@@ -211,10 +211,10 @@ PRESETS: dict[str, SlamConfig] = {
         ),
         walls=WallsConfig(enabled=True),
     ),
-    # Published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many), ranges
-    # of 0.3-4.284 m, no online correlative matcher, 100 iterations, optimisation every 90 nodes, stock loop closure
-    # (window 7 m and 30 deg, score 0.55, distance 15 m). Its weights of occupied space, translation and rotation (70,
-    # 600, 40) stand for what is known of the odometry, which here comes with a covariance.
+    # As published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many),
+    # ranges of 0.3-4.284 m, no online correlative matcher, 100 iterations, optimisation every 90 nodes, default loop
+    # closure (window 7 m and 30 deg, score 0.55, distance 15 m). Its weights of occupied space, translation and
+    # rotation (70, 600, 40) model the uncertainty of odometry; here the covariances of odometry replace them.
     "cartographer": SlamConfig(
         node=NodeConfig(distance=0.2, angle=0.0175, duration=5.0, scans=1, min_points=10),
         grid=GridConfig(

@@ -1,11 +1,11 @@
-"""Correlative search: the pose in a window at which a scan's points fall on the most probable cells.
+"""Correlative scan matching: the pose in a search window at which a scan's points fall on the most probable cells.
 
-Branch and bound over a pyramid (Hess et al., ICRA 2016, section V.C). Level h holds, on cells of 2^h, the maximum over
-2 x 2 such cells, so that all poses whose shift lies in a block of 2^h x 2^h cells are bounded by one look-up per point:
-the best pose of the window is found as if all had been tried. A pyramid takes 4/3 of the bytes of its grid.
+Branch and bound over a pyramid of grids (Hess et al., ICRA 2016, section V.C). Level h stores, for cells of 2^h, the
+maximum over 2 x 2 such cells, so one look-up per point bounds the score of all shifts in a block of 2^h x 2^h cells.
+The result is the best pose of the window, as in an exhaustive search. A pyramid takes 4/3 of the memory of its grid.
 
-Echoes should lie where the map is occupied. Places in front of them, as seen by the sensor, should lie where it is
-free: a wall seen from its other side, which is what a corridor's two walls are to each other, is another wall.
+Points should fall on occupied cells, and places in front of them, towards the sensor, on free cells. The second
+condition distinguishes the two sides of a wall, and so the two walls of a corridor.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,19 @@ from jaxtyping import Float
 
 from radarize.slam.grid import OccupancyGrid
 
-_STEPS = 9  # between the middle of the window and its edge, at which `scatter` looks
-_TURN = 0.05  # rad between them, at most
-_BLIND = 0.1  # least share of a window's information that counts
+#: Sampling of the window by `scatter`: number of steps from its centre to its edge, and maximum step of the angle, rad.
+_STEPS, _MAX_TURN = 9, 0.05
+#: Minimum of 1 - (variance within the window / variance of a uniform distribution over it): it bounds the covariance of
+#: unobservable directions.
+_MIN_INFORMATION = 0.1
 
 
 class Levels(NamedTuple):
-    """Bounds of a grid at falling resolution, probabilities in 1/255, all levels in one buffer.
+    """Levels of a pyramid, from fine to coarse, probabilities in 1/255, in one buffer.
 
     Attributes:
-        buffer: levels one after the other, row by row: first of being occupied, then, if asked for, of being free.
+        buffer: levels one after the other, row by row: first probability of being occupied, then, if requested, of
+            being free.
         starts, rows, columns: of each level; from level 1 on, cell (-1, -1) is stored at (0, 0).
     """
 
@@ -37,30 +40,30 @@ class Levels(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Poses that are tried: shifts of up to `half` cells each way, and angles (rad).
+    """Search window: shifts of up to `half` cells in x and y, and angles (rad).
 
     Attributes:
-        angles: in the grid's frame.
-        prices: subtracted from the score at each angle.
-        half: cells.
-        price: subtracted from the score per square cell away from the middle.
+        angles: in the frame of the grid.
+        angle_penalties: penalty of each angle, subtracted from the score.
+        half: half width, cells.
+        shift_penalty: penalty per square cell of the distance from the centre, subtracted from the score.
     """
 
     angles: np.ndarray
-    prices: np.ndarray
+    angle_penalties: np.ndarray
     half: int
-    price: float
+    shift_penalty: float
 
 
 @dataclass(frozen=True)
 class Pyramid:
-    """A grid, ready to be searched.
+    """Pyramid of a grid for the branch-and-bound search.
 
     Attributes:
         resolution, origin: of level 0, as in `OccupancyGrid`.
-        half: half-width of the largest window that can be searched, cells; twice this much empty space is added around
-            the grid, so that the search need not look where the grid ends.
-        levels: its bounds.
+        half: half width of the largest search window, cells; the grid is padded by twice this width, so that the search
+            needs no bounds check.
+        levels: the grids.
     """
 
     resolution: float
@@ -70,7 +73,7 @@ class Pyramid:
 
     @classmethod
     def of(cls, grid: OccupancyGrid, levels: int, distance: float, free: bool = False) -> "Pyramid":
-        """Pyramid with `levels` halvings for windows of half-width up to `distance` (m)."""
+        """Return the pyramid of a grid with `levels` halvings, for windows of half width up to `distance` (m)."""
         half = int(np.ceil(distance / grid.resolution))
         rows, columns = np.array(grid.probability.shape)[:, None] + 4 * half
         size = 1 << np.arange(levels + 1)
@@ -100,21 +103,21 @@ def search(
     penalty: tuple[float, float] = (0.0, 0.0),
     fronts: Float[np.ndarray, "m 2"] | None = None,
 ) -> tuple[Float[np.ndarray, "3"], float] | None:
-    """Best pose of a window around a guess, or None if none scores above `min_score`.
+    """Return the best pose of a window around a guess, or None if no score exceeds `min_score`.
 
     Args:
         pyramid: of the submap.
-        points: in the scan's frame, m.
-        guess: middle of the window, in the submap's frame.
-        distance, angle: half-widths of the window, m and rad. The angle steps by one cell at the 90th percentile of
-            the points' ranges.
-        min_score: mean probability at the points and, if there are any, of being free at the fronts, the lower of
-            both, 0...1.
-        penalty: subtracted from the score per square metre and per square radian away from the guess.
-        fronts: places in front of the points, m, for a pyramid that knows what is free.
+        points: in the frame of the scan, m.
+        guess: centre of the window, in the frame of the submap.
+        distance, angle: half widths of the window, m and rad. The step of the angle moves a point at the 90th
+            percentile of the ranges by one cell.
+        min_score: minimum of the mean probability of occupied cells at the points and, if given, of free cells at the
+            fronts, 0...1.
+        penalty: subtracted from the score per square metre and per square radian of the distance from the guess.
+        fronts: places in front of the points, m, for a pyramid with `free`.
 
     Returns:
-        Pose in the submap's frame and its score, penalty subtracted.
+        Pose in the frame of the submap, and its score minus the penalty.
     """
     if not len(points):
         return None
@@ -147,28 +150,28 @@ def scatter(
     angle: float,
     sigma: float,
 ) -> Float[np.ndarray, "3 3"]:
-    """Covariance of a pose that was found, by how well its points fit elsewhere.
+    """Covariance of a matched pose, from the likelihood of all poses in a window around it.
 
-    The curvature at the best pose knows nothing of a second place that fits as well, and takes the roughness of a
-    straight wall for knowledge of where along it one is. So poses of a whole window around it are weighed by their
-    likelihood, and the second moment is taken (Olson, Real-Time Correlative Scan Matching, ICRA 2009). What the
-    window's own size says is taken off again: where all of it fits alike, nothing is known.
+    The curvature at the best pose misses a second pose that fits as well, and overestimates the information along a
+    straight wall, from its roughness. So the covariance is the second moment over the window, weighted by likelihood
+    (Olson, Real-Time Correlative Scan Matching, ICRA 2009). The result is corrected for the finite window: if all poses
+    fit equally, the pose is unobservable.
 
     Args:
         pyramid: of the submap.
-        points: in the scan's frame, m.
-        pose: in the submap's frame.
-        distance, angle: half-widths of the window, m and rad.
+        points: in the frame of the scan, m.
+        pose: in the frame of the submap.
+        distance, angle: half widths of the window, m and rad.
         sigma: standard deviation of the residual of one point, as in `radarize.slam.matcher`.
 
     Returns:
-        for (x, y, yaw) in the scan's frame.
+        Covariance for (x, y, yaw) in the frame of the scan.
     """
     half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
     stride = max(half // _STEPS, 1)
     half -= half % stride
     shifts = np.arange(-half, half + 1, stride)
-    turns = np.linspace(-angle, angle, 2 * int(np.ceil(angle / _TURN)) + 1)
+    turns = np.linspace(-angle, angle, 2 * int(np.ceil(angle / _MAX_TURN)) + 1)
     residuals = (1 - np.maximum(2 * np.arange(256) / 255 - 1, 0)) ** 2
     rows, columns = pyramid.levels.rows[0], pyramid.levels.columns[0]
     cost = _costs(
@@ -184,8 +187,8 @@ def scatter(
     window = np.array([half, half, angle])
     away = away / window  # -1...1
     moment = (away * weight.reshape(-1, 1)).T @ away / weight.sum()
-    share, axes = np.linalg.eigh(3 * moment)  # 1: as much as a window without preference
-    spread = axes * (share / np.maximum(1 - share, _BLIND)) @ axes.T / 3
+    share, axes = np.linalg.eigh(3 * moment)  # 1: as for a uniform distribution over the window
+    spread = axes * (share / np.maximum(1 - share, _MIN_INFORMATION)) @ axes.T / 3
     size = window * [pyramid.resolution, pyramid.resolution, 1]
     c, s = np.cos(pose[2]), np.sin(pose[2])
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) * size
@@ -194,7 +197,7 @@ def scatter(
 
 @numba.njit(cache=True, nogil=True)
 def _costs(grid, points, origin, angles, shifts, residuals):
-    # Sum of the residuals at the points, of every pose of the window; shifts in cells.
+    # Sum of the residuals at the points, for every pose of the window; shifts in cells.
     costs = np.empty((len(angles), len(shifts), len(shifts)))
     rows, columns = np.empty(len(points), np.int64), np.empty(len(points), np.int64)
     low, high = shifts[0], shifts[-1]
@@ -243,7 +246,7 @@ def _fill(buffer, starts, rows, columns):
 
 @numba.njit(cache=True, nogil=True)
 def _mean(buffer, cells, shift, needed, count):
-    # Mean at the cells, of `count` points with those outside, or an upper bound of it once that is below the needed.
+    # Mean over `count` points, with 0 for points outside of the grid; an upper bound once that is below `needed`.
     total, unit = np.int64(0), 1 / (255.0 * count)
     for start in range(0, len(cells), 16):
         end = min(start + 16, len(cells))
@@ -257,7 +260,7 @@ def _mean(buffer, cells, shift, needed, count):
 
 @numba.njit(cache=True, nogil=True)
 def _bound(buffer, cells, split, shift, needed, echoes, fronts):
-    # The lower one of both means; of bounds it is a bound.
+    # Minimum of the means at echoes and fronts; a bound if the inputs are bounds.
     score = _mean(buffer, cells[:split], shift, needed, echoes)
     if fronts > 0 and score > needed:
         score = min(score, _mean(buffer, cells[split:], shift, needed, fronts))
@@ -272,15 +275,15 @@ def _cells(corner, h, starts, columns, out):
 
 
 @numba.njit(cache=True, nogil=True)
-def _nearest(low, size):
-    # Smallest distance to 0 of the integers low ... low + size - 1.
+def _min_distance(low, size):
+    # Minimum absolute value of the integers low ... low + size - 1.
     return max(low, -(low + size - 1), 0)
 
 
 @numba.njit(cache=True, nogil=True)
 def _search(levels, points, echoes, guess, window, min_score):
-    # Points and guess in cells, the first `echoes` points to lie on what is occupied, the others on what is free.
-    # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
+    # Points and guess in cells; the first `echoes` points belong on occupied cells, the others on free cells. Shifts
+    # (dx, dy) count from the corner of the window, so a shift of a block at its level is one offset for all points.
     buffer, starts, rows, columns = levels
     angles, half = window.angles, window.half
     top = len(starts) - 1
@@ -288,7 +291,7 @@ def _search(levels, points, echoes, guess, window, min_score):
     across = (2 * half + size) // size
     count = len(angles) * across * across
     fronts = len(points) - echoes
-    # Cells of the points, by angle; those below the top level only of angles that are looked at closer.
+    # Cells of the points by angle; below the top level they are computed only for angles that are refined.
     corner, inside = np.empty((len(angles), len(points), 3), np.int32), np.zeros(len(angles), np.int64)
     split = np.zeros(len(angles), np.int64)
     cells, known = np.empty((len(angles), top + 1, len(points)), np.int32), np.zeros(len(angles), np.bool_)
@@ -308,8 +311,8 @@ def _search(levels, points, echoes, guess, window, min_score):
         for i in range(across):
             for j in range(across):
                 dx, dy = i * size, j * size
-                away = _nearest(dx - half, size) ** 2 + _nearest(dy - half, size) ** 2
-                cost = window.prices[a] + window.price * away
+                away = _min_distance(dx - half, size) ** 2 + _min_distance(dy - half, size) ** 2
+                cost = window.angle_penalties[a] + window.shift_penalty * away
                 shift = i + j * columns[top]
                 score = _bound(buffer, cells[a, top, : inside[a]], split[a], shift, min_score + cost, echoes, fronts)
                 bounds[n] = score - cost
@@ -343,12 +346,12 @@ def _search(levels, points, echoes, guess, window, min_score):
                 child[c, 0], child[c, 1] = cx, cy
                 child_bound[c] = -1.0
                 if cx <= 2 * half and cy <= 2 * half:
-                    away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
+                    away = _min_distance(cx - half, size) ** 2 + _min_distance(cy - half, size) ** 2
                     shift = (cx >> level) + (cy >> level) * columns[level]
-                    cost = window.prices[a] + window.price * away
+                    cost = window.angle_penalties[a] + window.shift_penalty * away
                     score = _bound(buffer, cells[a, level, : inside[a]], split[a], shift, best + cost, echoes, fronts)
                     child_bound[c] = score - cost
-            for c in np.argsort(child_bound):  # the best child is looked at first
+            for c in np.argsort(child_bound):  # the best child is on top of the stack
                 if child_bound[c] > best:
                     stack_bound[depth] = child_bound[c]
                     stack[depth, 0], stack[depth, 1], stack[depth, 2] = child[c, 0], child[c, 1], level

@@ -1,8 +1,8 @@
-"""Occupancy grids: what rays say about the cells they cross and end in.
+"""Occupancy grids from rays.
 
-A cell holds the probability that it is occupied, 0 where no ray has been. Evidence is multiplied as odds, which is
-adding log odds: one hit multiplies by hit / (1 - hit), one miss by miss / (1 - miss), and per insertion a cell takes
-either one hit or one miss, the hit first (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016, eq. 2-3).
+A cell holds the probability that it is occupied, 0 if unknown. Evidence multiplies the odds (adds log odds): a hit by
+hit / (1 - hit), a miss by miss / (1 - miss). Per insertion a cell gets either one hit or one miss; a hit has priority
+(Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016, eq. 2-3).
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from jaxtyping import Float, Int, UInt8
 from radarize.io.errors import InputError
 from radarize.slam.config import GridConfig
 
-_MARGIN = 32  # cells added around whatever a grid has to hold when it grows
-#: Cells of a map: half a kilometre square, 512 MB.
-_MOST = 1 << 27
+_MARGIN = 32  # cells added around the contents of a grid when it grows
+#: Maximum number of cells of a map: 0.5 km x 0.5 km at 0.05 m, 512 MB.
+_MAX_CELLS = 1 << 27
 
 
 class Evidence(NamedTuple):
-    """What a hit and a miss multiply a cell's odds by, and the probabilities that it is kept between."""
+    """Factors of a cell's odds for a hit and a miss, and limits of its probability."""
 
     hit: float
     miss: float
@@ -31,12 +31,12 @@ class Evidence(NamedTuple):
 
 @dataclass
 class OccupancyGrid:
-    """A grid of probabilities, rows along +y and columns along +x.
+    """Grid of occupancy probabilities, rows along +y and columns along +x.
 
     Attributes:
         resolution: cell size, m.
         origin: x, y of the outer corner of cell (0, 0), m.
-        probability: 0 where unknown. float32, or of a grid that is finished uint8 in steps of 1/255.
+        probability: 0 where unknown. float32, or uint8 in steps of 1/255 for a finished grid.
     """
 
     resolution: float
@@ -45,11 +45,11 @@ class OccupancyGrid:
 
     @classmethod
     def empty(cls, resolution: float) -> "OccupancyGrid":
-        """A grid that knows nothing yet."""
+        """Return a grid without known cells."""
         return cls(resolution, np.zeros(2), np.zeros((1, 1), np.float32))
 
     def cells(self, points: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "n 2"]:
-        """Row and column of points, inside the grid or not."""
+        """Return row and column of points, inside the grid or not."""
         return np.floor((points - self.origin) / self.resolution).astype(np.int64)[:, ::-1]
 
     def insert(
@@ -60,10 +60,11 @@ class OccupancyGrid:
         config: GridConfig,
         spread: bool = False,
     ) -> None:
-        """Add the rays of one node: cells on the way are missed, the end is hit where `hits` is true, else missed.
+        """Insert the rays of one node: cells along a ray are missed; its last cell is hit where `hits` is true, else
+        missed.
 
-        With `spread` a hit is shared among the four cells around it, log odds weighted bilinearly: surfaces then lie
-        where they are and not in the middle of cells, which would pull every match to its submap's raster. Without it
+        With `spread`, a hit is shared among the four nearest cells, with bilinear weights of the log odds. This places
+        surfaces with sub-cell accuracy; otherwise matches would be attracted to the centres of cells. Without it,
         surfaces are one cell thin.
         """
         if not len(ends):
@@ -80,7 +81,7 @@ class OccupancyGrid:
 
     def _grow(self, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
         rows, columns = self.probability.shape
-        first, last = self.cells(np.stack([low, high])) + [[-1], [1]]  # a spread hit reaches one cell further
+        first, last = self.cells(np.stack([low, high])) + [[-1], [1]]  # a spread hit also changes the next cell
         if self.probability.size == 1:  # an empty grid starts where its first rays are
             self.origin = (first[::-1] - _MARGIN) * self.resolution + self.origin
             shape = last - first + 1 + 2 * _MARGIN
@@ -96,14 +97,14 @@ class OccupancyGrid:
 
     def _check(self, shape: np.ndarray) -> None:
         rows, columns = map(float, shape)
-        if rows * columns > _MOST:
+        if rows * columns > _MAX_CELLS:
             raise InputError(
                 f"a map of {columns * self.resolution:.0f} x {rows * self.resolution:.0f} m would be needed, expected "
-                f"at most {_MOST} cells of {self.resolution:g} m: poses or ranges are no metres"
+                f"at most {_MAX_CELLS} cells of {self.resolution:g} m: poses or ranges are no metres"
             )
 
     def crop(self, margin: int = 0) -> "OccupancyGrid":
-        """The smallest grid with all known cells, and `margin` unknown ones around them."""
+        """Return the smallest grid with all known cells, padded by `margin` unknown ones."""
         known = np.argwhere(self.probability > 0)
         if not len(known):
             return OccupancyGrid.empty(self.resolution)
@@ -113,18 +114,18 @@ class OccupancyGrid:
         return OccupancyGrid(self.resolution, origin, np.pad(inner, margin))
 
     def quantised(self) -> "OccupancyGrid":
-        """The same in a quarter of the memory; rays can no longer be added."""
+        """Return the grid in uint8, a quarter of the memory; rays can no longer be inserted."""
         if self.probability.dtype == np.uint8:
             return self
         return OccupancyGrid(self.resolution, self.origin, np.rint(255 * self.probability).astype(np.uint8))
 
     @property
     def unit(self) -> float:
-        """What `probability` counts in."""
+        """Probability per step of `probability`."""
         return 1 / 255 if self.probability.dtype == np.uint8 else 1.0
 
     def image(self) -> UInt8[np.ndarray, "row column"]:
-        """The map_server picture, y up: 0 occupied, 254 free, 205 unknown."""
+        """Return the map as an image of map_server, y up: 0 occupied, 254 free, 205 unknown."""
         picture = np.full(self.probability.shape, 205, np.uint8)
         picture[self.probability >= 0.65] = 0
         picture[(self.probability > 0) & (self.probability <= 0.35)] = 254
@@ -133,7 +134,7 @@ class OccupancyGrid:
 
 @numba.njit(cache=True, nogil=True)
 def cross(x0: float, y0: float, x1: float, y1: float, out: np.ndarray) -> int:
-    """Cells (row, column) that a segment crosses, in order, both ends included; returns their number.
+    """List the cells (row, column) that a segment crosses, in order, including both ends; returns their number.
 
     Coordinates in cells. A. Amanatides, A. Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, Eurographics 1987.
     """
@@ -162,13 +163,13 @@ def _insert(probability, origins, ends, hits, evidence, spread):
     left, top = int(min(origins[:, 0].min(), ends[:, 0].min())) - 1, int(min(origins[:, 1].min(), ends[:, 1].min())) - 1
     right = int(max(origins[:, 0].max(), ends[:, 0].max())) + 1
     bottom = int(max(origins[:, 1].max(), ends[:, 1].max())) + 1
-    # What this insertion says of each cell: a share of a hit (0...1], or a miss (-1), or nothing.
-    news = np.zeros((bottom - top + 1, right - left + 1), np.float32)
-    line = np.empty((2 * (news.shape[0] + news.shape[1]), 2), np.int64)
+    # Evidence of this insertion per cell: a share of a hit (0...1], a miss (-1), or none (0).
+    inserted = np.zeros((bottom - top + 1, right - left + 1), np.float32)
+    line = np.empty((2 * (inserted.shape[0] + inserted.shape[1]), 2), np.int64)
     for i in range(len(ends)):
         count = cross(origins[i, 0], origins[i, 1], ends[i, 0], ends[i, 1], line)
         for k in range(count - 1 if hits[i] else count):
-            news[line[k, 0] - top, line[k, 1] - left] = -1
+            inserted[line[k, 0] - top, line[k, 1] - left] = -1
     for i in range(len(ends)):
         if hits[i] and spread:
             row, column = int(np.floor(ends[i, 1] - 0.5)), int(np.floor(ends[i, 0] - 0.5))
@@ -176,13 +177,13 @@ def _insert(probability, origins, ends, hits, evidence, spread):
             for j in range(2):
                 for k in range(2):
                     share = (v if j else 1 - v) * (u if k else 1 - u)
-                    if share > news[row + j - top, column + k - left]:
-                        news[row + j - top, column + k - left] = share
+                    if share > inserted[row + j - top, column + k - left]:
+                        inserted[row + j - top, column + k - left] = share
         elif hits[i]:
-            news[int(np.floor(ends[i, 1])) - top, int(np.floor(ends[i, 0])) - left] = 1
-    for row in range(news.shape[0]):
-        for column in range(news.shape[1]):
-            share = news[row, column]
+            inserted[int(np.floor(ends[i, 1])) - top, int(np.floor(ends[i, 0])) - left] = 1
+    for row in range(inserted.shape[0]):
+        for column in range(inserted.shape[1]):
+            share = inserted[row, column]
             if share != 0:
                 p = probability[row + top, column + left]
                 odds = (p / (1 - p) if p > 0 else 1.0) * (evidence.miss if share < 0 else evidence.hit**share)

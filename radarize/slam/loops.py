@@ -1,7 +1,7 @@
-"""Loop closure: where has this place been seen before?
+"""Loop closure: search and verification.
 
-Searches run beside the caller in threads (the kernels release Python's lock). Each result is taken in a fixed number
-of nodes after its search began, waited for if it is late: so threads change when work is done and never what comes out.
+Searches run in background threads (the kernels release the GIL). Each result is used a fixed number of nodes after its
+search began, and waited for if it is late. So the timing of threads does not change the result.
 """
 
 from collections import deque
@@ -23,20 +23,20 @@ from radarize.slam.odometry import Drift
 from radarize.slam.posegraph import PoseGraph
 from radarize.slam.submap import Submap
 
-_PYRAMIDS = 12  # kept of the submaps searched last
+_PYRAMIDS = 12  # number of cached pyramids of submaps
 _WORKERS = 2
 
 
 @dataclass(frozen=True)
-class Question:
-    """Where in a submap is a node?
+class LoopCandidate:
+    """Pair of a node and a submap to search for a loop closure.
 
     Attributes:
-        submap, node: number of the node.
-        points, fronts: seen from the node, as in `Node`, m.
-        guess: pose of the node in the submap's frame.
+        submap, node: the submap, and the number of the node.
+        points, fronts: in the frame of the node, as in `Node`, m.
+        guess: pose of the node in the frame of the submap.
         spread: covariance of the guess, in the frame of the node.
-        min_score: that an answer needs.
+        min_score: minimum score of a closure.
     """
 
     submap: Submap
@@ -50,13 +50,13 @@ class Question:
 
 @dataclass(frozen=True)
 class Closure:
-    """A node found in a submap.
+    """Match of a node with a submap.
 
     Attributes:
-        anchor, node: numbers of the submap's anchor and of the node.
-        pose: of the node in the anchor's frame.
-        covariance: of the pose for (x, y, yaw) in the node's frame.
-        score: mean probability at the node's points.
+        anchor, node: numbers of the anchor of the submap and of the node.
+        pose: of the node in the frame of the anchor.
+        covariance: of the pose for (x, y, yaw) in the frame of the node.
+        score: mean probability at the points of the node.
     """
 
     anchor: int
@@ -67,47 +67,47 @@ class Closure:
 
 
 class LoopSearch:
-    """Answers questions in the background, in the order in which they were asked."""
+    """Searches loop candidates in the background, in the order of their submission."""
 
     def __init__(self, config: LoopConfig):
         self.config = config
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
-        self._asked: deque[tuple[int, Future]] = deque()
+        self._pending: deque[tuple[int, Future]] = deque()
         self._unpack = lru_cache(_PYRAMIDS)(self._build)
 
     def _build(self, submap: Submap) -> tuple[OccupancyGrid, Pyramid]:
         grid = submap.grid
         return grid, Pyramid.of(grid, self.config.levels, self.config.distance, free=self.config.front > 0)
 
-    def ask(self, questions: Sequence[Question]) -> None:
-        """Begin to search."""
-        for question in questions:
-            self._asked.append((question.node, self._pool.submit(self.answer, question)))
+    def submit(self, candidates: Sequence[LoopCandidate]) -> None:
+        """Start to search candidates."""
+        for candidate in candidates:
+            self._pending.append((candidate.node, self._pool.submit(self.search, candidate)))
 
-    def answers(self, before: int | None = None) -> list[Closure]:
-        """What was found for nodes up to `before`, or for all; waits for it."""
+    def results(self, before: int | None = None) -> list[Closure]:
+        """Return the closures found for nodes up to `before`, or for all; waits for them."""
         found = []
-        while self._asked and (before is None or self._asked[0][0] <= before):
-            found.append(self._asked.popleft()[1].result())
+        while self._pending and (before is None or self._pending[0][0] <= before):
+            found.append(self._pending.popleft()[1].result())
         return [closure for closure in found if closure is not None]
 
-    def answer(self, question: Question) -> Closure | None:
-        """Search around the guess, refine, and check the result again."""
-        c, submap, points = self.config, question.submap, question.points
+    def search(self, candidate: LoopCandidate) -> Closure | None:
+        """Search around the guess and refine the result; None if there is no match."""
+        c, submap, points = self.config, candidate.submap, candidate.points
         grid, pyramid = self._unpack(submap)
-        place = float(np.sqrt(np.linalg.eigvalsh(question.spread[:2, :2])[1]))
-        turn = float(np.sqrt(question.spread[2, 2]))
-        # The mean residual that moves as much as the guess's covariance does.
-        price = c.sigma**2 / max(len(points), 1)
+        position_std = float(np.sqrt(np.linalg.eigvalsh(candidate.spread[:2, :2])[1]))
+        yaw_std = float(np.sqrt(candidate.spread[2, 2]))
+        # Penalty of the mean score that corresponds to the covariance of the guess.
+        unit_penalty = c.sigma**2 / max(len(points), 1)
         found = search(
             pyramid,
             points,
-            question.guess,
-            distance=min(c.distance, max(3 * place, 4 * grid.resolution)),
-            angle=min(c.angle, max(3 * turn, 0.05)),
-            min_score=question.min_score,
-            penalty=(price / place**2, price / turn**2),
-            fronts=question.fronts if c.front else None,
+            candidate.guess,
+            distance=min(c.distance, max(3 * position_std, 4 * grid.resolution)),
+            angle=min(c.angle, max(3 * yaw_std, 0.05)),
+            min_score=candidate.min_score,
+            penalty=(unit_penalty / position_std**2, unit_penalty / yaw_std**2),
+            fronts=candidate.fronts if c.front else None,
         )
         if found is None:
             return None
@@ -115,46 +115,46 @@ class LoopSearch:
         refined = match(grid, points, pose, sigma=c.sigma)
         moved = np.abs(between(pose, refined.pose))
         if max(moved[0], moved[1]) > 4 * grid.resolution or moved[2] > 0.1:
-            return None  # the peak of the search is no minimum of the refinement: not a place that fits
-        covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
+            return None  # the refinement leaves the peak of the search: no match
+        covariance = match_covariance(refined, c.translation_floor, c.rotation_floor)
         covariance += scatter(pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma)
-        return Closure(submap.anchor, question.node, refined.pose, covariance, score)
+        return Closure(submap.anchor, candidate.node, refined.pose, covariance, score)
 
 
-class Jury:
-    """Decides which closures move poses at once; the graph's final optimisation decides over all of them again.
+class LoopVerifier:
+    """Verifies closures for immediate use; the final optimisation of the graph decides over all of them again.
 
-    A closure that agrees with the present estimate is believed. One that contradicts it must be possible given how
-    far odometry may have drifted since, and is believed when others, of nodes near by, contradict it the same way:
-    a place that only looks the same seldom looks the same from several.
+    A closure that agrees with the current estimate is accepted. One that contradicts it has to be possible given the
+    drift of odometry, and is accepted when other closures, of other nodes nearby, contradict it in the same way:
+    perceptual aliasing rarely persists over several nodes.
     """
 
     def __init__(self, graph: PoseGraph, drift: Drift, config: LoopConfig):
         self.graph, self.drift, self.config = graph, drift, config
         self._limit = float(chdtri(3, 1 - config.inlier_probability))
-        self._doubtful: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
+        self._contradicting: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
 
     def forget(self) -> None:
-        """Begin anew with what is doubtful: nodes have other numbers now."""
-        self._doubtful.clear()
+        """Forget contradicting closures: nodes have been renumbered."""
+        self._contradicting.clear()
 
-    def hear(self, closure: Closure) -> bool:
-        """Enter a closure into the graph; True if poses should move for it now."""
+    def check(self, closure: Closure) -> bool:
+        """Add a closure to the graph and accept it if verified; True if the graph should be updated now."""
         number = len(self.graph.closures)
         self.graph.add_closure(closure.anchor, closure.node, closure.pose, closure.covariance)
         poses = self.graph.poses
         error = between(between(poses[closure.anchor], poses[closure.node]), closure.pose)
         if self._fits(error, closure.covariance):
-            self.graph.believe(number)
+            self.graph.accept(number)
             return False
         if not self._fits(error, closure.covariance + self.drift.between(closure.anchor, closure.node)):
             return False
-        agreeing = [n for n, other in self._doubtful if self._agree(other, closure)]
-        self._doubtful.append((number, closure))
+        agreeing = [n for n, other in self._contradicting if self._agree(other, closure)]
+        self._contradicting.append((number, closure))
         if len(agreeing) + 1 < self.config.support:
             return False
         for n in (*agreeing, number):
-            self.graph.believe(n)
+            self.graph.accept(n)
         return True
 
     def _agree(self, first: Closure, second: Closure) -> bool:
@@ -170,7 +170,8 @@ class Jury:
         return float(error @ np.linalg.solve(covariance, error)) <= self._limit
 
 
-def uncertainty(result: Match, translation: float, rotation: float) -> Float[np.ndarray, "3 3"]:
-    """Covariance of a match: the inverse of its information, with floors (m, rad); 10 m and 1 rad where blind."""
-    blind = np.diag([1e-2, 1e-2, 1.0])
-    return np.linalg.inv(result.information + blind) + np.diag([translation, translation, rotation]) ** 2
+def match_covariance(result: Match, translation: float, rotation: float) -> Float[np.ndarray, "3 3"]:
+    """Covariance of a match: the inverse of its information, plus minimum standard deviations (m, rad); 10 m and 1 rad
+    where unobservable."""
+    prior_information = np.diag([1e-2, 1e-2, 1.0])
+    return np.linalg.inv(result.information + prior_information) + np.diag([translation, translation, rotation]) ** 2

@@ -4,10 +4,10 @@ The pose T of a scan in a submap minimises
 
     sum_k ((1 - M(T p_k)) / sigma)^2 + e^T C^-1 e,      e = (R0^T (t - t0), yaw - yaw0)
 
-over the scan's points p_k, M the submap's occupancy and (t0, yaw0), C what odometry says (compare Hess et al., ICRA
-2016, eq. CS, which leaves out the prior's covariance). M is the quadratic B-spline over the cells' max(2 p - 1, 0): its
-gradient is continuous, it never overshoots, and with free and unknown cells both at 0 a wall's ridge leans to neither
-of its sides.
+over the points p_k of the scan. M is the occupancy of the submap; (t0, yaw0) is the pose predicted by odometry and C
+its covariance (compare Hess et al., ICRA 2016, eq. CS, which omits the covariance of the prior). M is the quadratic
+B-spline over max(2 p - 1, 0) of the cells. Its gradient is continuous and it does not overshoot. As free and unknown
+cells are both 0, the ridge along a wall is symmetric.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from radarize.slam.grid import OccupancyGrid
 
 
 class Surface(NamedTuple):
-    """A grid as the kernels take it: probabilities in steps of `unit`, the outer corner and the cells' size in m."""
+    """Grid in the form of the kernels: probabilities in steps of `unit`, outer corner and cell size in m."""
 
     probability: np.ndarray
     unit: float
@@ -32,12 +32,12 @@ class Surface(NamedTuple):
 
 @dataclass(frozen=True)
 class Match:
-    """Result of a match.
+    """Result of scan matching.
 
     Attributes:
-        pose: of the scan in the grid's frame.
-        score: mean occupancy M at the scan's points, 0...1.
-        information: of the scan alone, without the prior, for (x, y, yaw) in the scan's frame.
+        pose: of the scan in the frame of the grid.
+        score: mean occupancy M at the points, 0...1.
+        information: of the scan alone, without the prior, for (x, y, yaw) in the frame of the scan.
     """
 
     pose: Float[np.ndarray, "3"]
@@ -55,15 +55,15 @@ def match(
     covariance: Float[np.ndarray, "3 3"] | None = None,
     iterations: int = 20,
 ) -> Match:
-    """Refine a guess.
+    """Refine the pose of a scan in a submap.
 
     Args:
-        grid: submap.
-        points: in the scan's frame, m.
-        guess: where to start, in the grid's frame.
+        grid: of the submap.
+        points: in the frame of the scan, m.
+        guess: initial pose, in the frame of the grid.
         sigma: standard deviation of a residual 1 - M.
-        prior, covariance: expected pose and its covariance for (x, y, yaw) in the prior pose's frame; none: no prior.
-        iterations: at most so many steps.
+        prior, covariance: predicted pose and its covariance for (x, y, yaw) in the frame of that pose; None: no prior.
+        iterations: maximum number of iterations.
     """
     weight = np.zeros((3, 3)) if covariance is None else np.linalg.inv(covariance)
     return Match(
@@ -80,7 +80,8 @@ def match(
 
 
 def thin(points: Float[np.ndarray, "n 2"], spacing: float) -> Float[np.ndarray, "m 2"]:
-    """One point, the mean, for every square of the given size that holds any: near walls do not outvote far ones."""
+    """Return the mean of the points in every occupied square of the given size (m), so that near walls do not get more
+    weight than far ones."""
     if not len(points):
         return points
     cells = np.floor(points / spacing).astype(np.int64)
@@ -90,7 +91,8 @@ def thin(points: Float[np.ndarray, "n 2"], spacing: float) -> Float[np.ndarray, 
 
 @numba.njit(cache=True, nogil=True)
 def interpolate(probability: np.ndarray, x: float, y: float, unit: float = 1.0) -> tuple[float, float, float]:
-    """Quadratic B-spline over max(2 p - 1, 0) and its gradient; x, y in cells from the grid's corner; 0 outside."""
+    """Return the quadratic B-spline over max(2 p - 1, 0) and its gradient; x, y in cells from the corner of the grid; 0
+    outside."""
     rows, columns = probability.shape
     column, row = int(np.floor(x)), int(np.floor(y))
     if column < 1 or row < 1 or column >= columns - 1 or row >= rows - 1:
@@ -112,7 +114,7 @@ def interpolate(probability: np.ndarray, x: float, y: float, unit: float = 1.0) 
 
 @numba.njit(cache=True, nogil=True)
 def _cost(surface, points, pose, prior, prior_weight, weight, hessian, gradient):
-    # Fills the Gauss-Newton system at the pose; returns the cost and the mean occupancy.
+    # Compute the Gauss-Newton system at a pose; returns the cost and the mean occupancy.
     hessian[:] = 0
     gradient[:] = 0
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
@@ -148,7 +150,7 @@ def _cost(surface, points, pose, prior, prior_weight, weight, hessian, gradient)
 
 @numba.njit(cache=True, nogil=True)
 def _refine(surface, points, guess, prior, prior_weight, weight, iterations):
-    # Levenberg's damping: steps that raise the cost are taken back and shortened.
+    # Levenberg-Marquardt: a step that increases the cost is rejected, and the damping raised.
     pose = guess.copy()
     hessian, gradient = np.empty((3, 3)), np.empty(3)
     trial_hessian, trial_gradient = np.empty((3, 3)), np.empty(3)

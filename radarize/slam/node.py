@@ -1,4 +1,4 @@
-"""A node of the graph: the rays of one or several consecutive scans, seen from one place."""
+"""Node of the pose graph: the rays of one or several consecutive scans, in the frame of one of them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,13 +13,13 @@ from radarize.slam.matcher import thin
 
 @dataclass(frozen=True)
 class Scan:
-    """One scan as it came, with the odometry pose of its instant.
+    """A scan with the pose of odometry at its time.
 
     Attributes:
         time: s.
         odometry: pose in the odometry frame.
         azimuths: rad, positive to the left.
-        ranges: m; inf: nothing seen; nan: not known.
+        ranges: m; inf: no echo; nan: unknown.
     """
 
     time: float
@@ -29,11 +29,11 @@ class Scan:
 
 
 class Rays(NamedTuple):
-    """Lines along which a sensor saw.
+    """Rays of scans.
 
     Attributes:
         origins, ends: m.
-        hits: False for rays that saw nothing as far as their end.
+        hits: False for rays without an echo up to their end.
     """
 
     origins: Float[np.ndarray, "ray 2"]
@@ -43,15 +43,15 @@ class Rays(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """Scans in the frame of the reference, the one in their middle.
+    """Scans in the frame of the reference scan, the one in their middle.
 
-    A session keeps all of its nodes: so they hold what came, in single precision (1 um at 10 m), and make rays and
-    points, thrice as large, whenever somebody asks.
+    All nodes stay in memory. So a node stores the ranges in single precision (1 um at 10 m), and computes rays and
+    points, which take three times as much, on request.
 
     Attributes:
         time: of the reference scan, s.
         poses: of the scans.
-        azimuths: of the beams of each, rad; scans share them.
+        azimuths: of the beams of each scan, rad; scans share the arrays.
         ranges: of all beams, scan by scan, m.
         config: of the back end.
     """
@@ -64,18 +64,18 @@ class Node:
 
     @classmethod
     def gather(cls, scans: list[Scan], config: SlamConfig) -> "Node":
-        """Join scans by their odometry."""
+        """Return the node of some scans, joined by their odometry."""
         count = min(len(scans), config.node.scans)
         used = [scans[i] for i in np.unique(np.linspace(0, len(scans) - 1, count).round().astype(int))]
         reference = used[len(used) // 2]
-        with np.errstate(over="ignore"):  # so far away nothing is seen
+        with np.errstate(over="ignore"):  # overflows to inf, beyond any range
             ranges = np.concatenate([scan.ranges for scan in used]).astype(np.float32)
         poses = between(reference.odometry, np.array([scan.odometry for scan in used]))
         return cls(reference.time, poses, tuple(scan.azimuths for scan in used), ranges, config)
 
     @property
     def rays(self) -> Rays:
-        """Of all scans, in single precision."""
+        """Rays of all scans, in single precision."""
         origins, ends, hits = self._rays()
         return Rays(origins.astype(np.float32), ends.astype(np.float32), hits)
 
@@ -87,14 +87,14 @@ class Node:
 
     @property
     def fronts(self) -> Float32[np.ndarray, "front 2"]:
-        """Places `LoopConfig.front` before the ends of hits, thinned; none where nobody asks what is there."""
+        """Places at a distance of `LoopConfig.front` in front of the hits, thinned; empty if it is 0."""
         front = self.config.loop.front
         if not front:
             return np.zeros((0, 2), np.float32)
         origins, ends, hits = self._rays()
-        echo, way = ends[hits], ends[hits] - origins[hits]
-        share = front / np.maximum(np.linalg.norm(way, axis=1), front + 1e-9)
-        return thin(echo - share[:, None] * way, self.config.matcher.spacing).astype(np.float32)
+        end, ray = ends[hits], ends[hits] - origins[hits]
+        share = front / np.maximum(np.linalg.norm(ray, axis=1), front + 1e-9)
+        return thin(end - share[:, None] * ray, self.config.matcher.spacing).astype(np.float32)
 
     def _rays(self) -> Rays:
         starts = np.cumsum([len(each) for each in self.azimuths])[:-1]

@@ -1,9 +1,9 @@
-"""The pose graph: what nodes know of each other, and the poses that agree best with it.
+"""Pose graph: relative poses between nodes, and the poses that fit them best.
 
-While a session runs, closures that are believed go into iSAM2 (Kaess et al., IJRR 2012), which solves anew only what
-they touch. At its end graduated non-convexity (Yang et al., RA-L 2020) with odometry as known inliers decides over all
-closures and matches afresh (`gtsam.GncLMOptimizer`, truncated least squares). Robust kernels do worse: they keep
-some false closures and weaken true ones.
+While a session runs, accepted closures are added to iSAM2 (Kaess et al., IJRR 2012), which updates only the affected
+part. At its end, graduated non-convexity (Yang et al., RA-L 2020; `gtsam.GncLMOptimizer`, truncated least squares)
+decides over all closures and matches again, with odometry as known inliers. Robust kernels give worse results: they
+keep some false closures and weaken true ones.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,70 +20,72 @@ from radarize.slam.rows import Rows
 class PoseGraph:
     """Poses of nodes and relative poses between them.
 
-    Every relative pose is that of node `to` in the frame of node `of`, its covariance is for (x, y, yaw) in the frame
-    of `to`, the convention of gtsam. Node 0 stays where it is.
+    Every relative pose is that of node `to` in the frame of node `of`. Its covariance is for (x, y, yaw) in the frame
+    of `to`, the convention of gtsam. Node 0 is fixed.
 
     Args:
-        inlier_probability: a closure is rejected when its error is less likely than one minus this.
-        alike: so many matches, and so many closures, err alike, and count as one in `covariances`.
+        inlier_probability: a closure is rejected if its error is less likely than one minus this.
+        correlated: number of matches, and of closures, with fully correlated errors; `covariances` counts them as one.
 
     Attributes:
         closures: (of, to) of all closures.
-        accepted: (closure,) of each, whether it is believed.
-        solved: False once `covariances` could not be solved for.
+        accepted: (closure,) whether each closure is accepted.
+        solved: False once `covariances` failed.
     """
 
-    def __init__(self, inlier_probability: float = 0.99, alike: int = 1):
-        self.inlier_probability, self.alike = inlier_probability, alike
+    def __init__(self, inlier_probability: float = 0.99, correlated: int = 1):
+        self.inlier_probability, self.correlated = inlier_probability, correlated
         self.closures: list[tuple[int, int]] = []
         self.accepted = np.zeros(0, bool)
         self.solved = True
         self._poses = Rows(3)
-        self._certain: list[gtsam.BetweenFactorPose2] = []
-        self._matches: list[gtsam.BetweenFactorPose2] = []
-        self._matches_kept = np.zeros(0, bool)
-        self._uncertain: list[gtsam.BetweenFactorPose2] = []
+        self._motion_factors: list[gtsam.BetweenFactorPose2] = []
+        self._match_factors: list[gtsam.BetweenFactorPose2] = []
+        self._accepted_matches = np.zeros(0, bool)
+        self._closure_factors: list[gtsam.BetweenFactorPose2] = []
         self._isam: gtsam.ISAM2 | None = None
         self._factorization = "CHOLESKY"
-        self._news = gtsam.NonlinearFactorGraph()  # not in iSAM2 yet
-        self._known = 0  # nodes in iSAM2
+        self._pending = gtsam.NonlinearFactorGraph()  # factors that are not in iSAM2 yet
+        self._in_isam = 0  # number of nodes in iSAM2
 
     @property
     def poses(self) -> Float[np.ndarray, "node 3"]:
-        """Current estimate."""
+        """Current estimates."""
         return self._poses.values
 
     def add_node(self, pose: Float[np.ndarray, "3"]) -> int:
-        """Add a node with a first estimate; returns its number."""
+        """Add a node with an initial estimate; returns its number."""
         self._poses.append(pose)
         return len(self._poses) - 1
 
     def add_motion(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
-        """A relative pose that is known not to be an outlier: odometry."""
-        self._certain.append(_factor(of, to, relative, covariance))
-        self._news.add(self._certain[-1])
+        """Add a relative pose by odometry, a known inlier."""
+        self._motion_factors.append(_factor(of, to, relative, covariance))
+        self._pending.add(self._motion_factors[-1])
 
     def add_match(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
-        """A match to the submap being built, or walls that are parallel: believed at once, seldom false."""
-        self._matches.append(_factor(of, to, relative, covariance))
-        self._news.add(self._matches[-1])
+        """Add a match with the submap being built, or a heading constraint from walls: accepted until the final
+        optimisation."""
+        self._match_factors.append(_factor(of, to, relative, covariance))
+        self._pending.add(self._match_factors[-1])
 
     def add_closure(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
-        """A relative pose from a loop search, which may be false; it is not believed yet."""
-        self._uncertain.append(_factor(of, to, relative, covariance))
+        """Add a loop closure, which may be false; it has no effect until it is accepted."""
+        self._closure_factors.append(_factor(of, to, relative, covariance))
         self.closures.append((of, to))
         self.accepted = np.append(self.accepted, False)
 
-    def believe(self, closure: int) -> None:
-        """Let a closure move poses from the next `update` on."""
+    def accept(self, closure: int) -> None:
+        """Accept a closure; it takes effect at the next `update`."""
         if not self.accepted[closure]:
             self.accepted[closure] = True
-            self._news.add(self._uncertain[closure])
+            self._pending.add(self._closure_factors[closure])
 
     def keep(self, numbers: Sequence[int], spread: Callable[[int, int], Float[np.ndarray, "3 3"]]) -> None:
-        """Forget all nodes but these, which then count from 0 on.
+        """Remove all other nodes; those kept are renumbered from 0.
 
-        Where nodes go, their neighbours keep the motion between them as it is known now, as sure as odometry is of it.
+        Where nodes are removed, their neighbours get the current estimate of the motion between them, with the
+        covariance of odometry.
 
         Args:
             numbers: of the nodes to keep, ascending.
@@ -100,58 +102,59 @@ class PoseGraph:
                 gtsam.BetweenFactorPose2(*(place[k] for k in f.keys()), f.measured(), f.noiseModel()) for f in moved
             ]
 
-        steps = {tuple(factor.keys()): factor for factor in self._certain}
-        self._certain = [
+        steps = {tuple(factor.keys()): factor for factor in self._motion_factors}
+        self._motion_factors = [
             gtsam.BetweenFactorPose2(place[a], place[b], steps[a, b].measured(), steps[a, b].noiseModel())
             if (a, b) in steps
             else _factor(place[a], place[b], between(self.poses[a], self.poses[b]), spread(a, b))
             for a, b in pairwise(map(int, numbers))
         ]
-        matches, closures = stays(self._matches), stays(self._uncertain)
-        self._matches, self._uncertain = chosen(self._matches, matches), chosen(self._uncertain, closures)
-        self._matches_kept = self._matches_kept[matches[: len(self._matches_kept)]]
+        matches, closures = stays(self._match_factors), stays(self._closure_factors)
+        self._match_factors = chosen(self._match_factors, matches)
+        self._closure_factors = chosen(self._closure_factors, closures)
+        self._accepted_matches = self._accepted_matches[matches[: len(self._accepted_matches)]]
         self.accepted = self.accepted[closures]
-        self.closures = [tuple(factor.keys()) for factor in self._uncertain]
+        self.closures = [tuple(factor.keys()) for factor in self._closure_factors]
         poses, self._poses = self.poses[list(numbers)], Rows(3)
         for pose in poses:
             self._poses.append(pose)
-        self._isam, self._news = None, gtsam.NonlinearFactorGraph()
+        self._isam, self._pending = None, gtsam.NonlinearFactorGraph()
 
     def update(self) -> None:
-        """Move poses towards where everything believed agrees, by one step, solving anew only what changed."""
+        """Update the poses by one step of iSAM2 with all accepted factors."""
         if len(self.poses) < 2:
             return
         try:
             self._step()
-        except RuntimeError:  # steps known to 0.1 mm beside ones known to radians are too much for Cholesky, the faster
+        except RuntimeError:  # covariances from (0.1 mm)^2 to rad^2 in one graph exceed the precision of Cholesky
             self._isam, self._factorization = None, "QR"
             self._step()
 
     def _step(self) -> None:
         if self._isam is None:
-            self._isam, self._known = gtsam.ISAM2(_incremental(self._factorization)), 0
-            self._news = self._graph(self._believed())
-        self._isam.update(self._news, self._values(self._known))
-        self._news, self._known = gtsam.NonlinearFactorGraph(), len(self.poses)
+            self._isam, self._in_isam = gtsam.ISAM2(_incremental(self._factorization)), 0
+            self._pending = self._graph(self._accepted_factors())
+        self._isam.update(self._pending, self._values(self._in_isam))
+        self._pending, self._in_isam = gtsam.NonlinearFactorGraph(), len(self.poses)
         self.poses[:] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
 
     def optimise(self) -> None:
-        """Decide over all closures afresh, and move poses to the optimum."""
+        """Reject outliers among all closures and matches, and optimise the poses."""
         if len(self.poses) < 2:
             return
-        if self._uncertain or self._matches:
-            self._judge()
-        graph = self._graph(self._believed())
+        if self._closure_factors or self._match_factors:
+            self._reject_outliers()
+        graph = self._graph(self._accepted_factors())
         values = gtsam.LevenbergMarquardtOptimizer(graph, self._values(), _levenberg()).optimize()
         self.poses[:] = gtsam.utilities.extractPose2(values)
         self._isam = None
 
     def covariances(self) -> Float[np.ndarray, "node 3 3"]:
-        """Marginal covariance of every node for (x, y, yaw) in its own frame, given that node 0 is exact; where no
-        solver finds it, that of odometry alone, and `solved` is False."""
+        """Return the marginal covariance of every node for (x, y, yaw) in its own frame, given node 0. If no solver
+        succeeds, return that of odometry and set `solved` to False."""
         if not len(self.poses):
             return np.zeros((0, 3, 3))
-        graph, values = self._graph([self._counted(factor) for factor in self._believed()]), self._values()
+        graph, values = self._graph([self._downweighted(factor) for factor in self._accepted_factors()]), self._values()
         for solve in (gtsam.Marginals, _by_qr):
             try:
                 solution = solve(graph, values)
@@ -161,30 +164,31 @@ class PoseGraph:
             if np.isfinite(found).all() and (found.diagonal(axis1=1, axis2=2) > 0).all():
                 return found
         self.solved = False
-        return self._reckoned()
+        return self._odometry_covariances()
 
-    def _reckoned(self) -> Float[np.ndarray, "node 3 3"]:
-        """What odometry alone leaves unknown of every node: at least what it is with matches and closures."""
+    def _odometry_covariances(self) -> Float[np.ndarray, "node 3 3"]:
+        """Covariance of every node by odometry alone, an upper bound of that with matches and closures."""
         found = np.zeros((len(self.poses), 3, 3))
-        for factor in self._certain:
+        for factor in self._motion_factors:
             of, to = factor.keys()
             motion = between(self.poses[of], self.poses[to])
             found[to] = carried(found[of], motion) + factor.noiseModel().covariance()
         return found
 
-    def _believed(self) -> list:
-        new = np.ones(len(self._matches) - len(self._matches_kept), bool)
-        keep = np.concatenate([self._matches_kept, new, self.accepted])
-        return [factor for factor, keep in zip([*self._matches, *self._uncertain], keep, strict=True) if keep]
+    def _accepted_factors(self) -> list:
+        new = np.ones(len(self._match_factors) - len(self._accepted_matches), bool)
+        keep = np.concatenate([self._accepted_matches, new, self.accepted])
+        factors = [*self._match_factors, *self._closure_factors]
+        return [factor for factor, keep in zip(factors, keep, strict=True) if keep]
 
-    def _counted(self, factor: gtsam.BetweenFactorPose2) -> gtsam.BetweenFactorPose2:
-        """A match or a closure at its share: `alike` of them weigh as much as one."""
-        noise = gtsam.noiseModel.Gaussian.Covariance(self.alike * factor.noiseModel().covariance())
+    def _downweighted(self, factor: gtsam.BetweenFactorPose2) -> gtsam.BetweenFactorPose2:
+        """The factor of a match or a closure with its covariance multiplied by `correlated`."""
+        noise = gtsam.noiseModel.Gaussian.Covariance(self.correlated * factor.noiseModel().covariance())
         return gtsam.BetweenFactorPose2(*factor.keys(), factor.measured(), noise)
 
-    def _judge(self) -> None:
-        graph = self._graph([*self._matches, *self._uncertain])
-        known = 1 + len(self._certain)
+    def _reject_outliers(self) -> None:
+        graph = self._graph([*self._match_factors, *self._closure_factors])
+        known = 1 + len(self._motion_factors)
         parameters = gtsam.GncLMParams(_levenberg())
         parameters.setLossType(gtsam.GncLossType.TLS)
         parameters.setKnownInliers(list(range(known)))
@@ -192,13 +196,13 @@ class PoseGraph:
         optimizer.setInlierCostThresholdsAtProbability(self.inlier_probability)
         optimizer.optimize()
         kept = np.asarray(optimizer.getWeights())[known:] > 0.5
-        self._matches_kept, self.accepted = kept[: len(self._matches)], kept[len(self._matches) :]
+        self._accepted_matches, self.accepted = kept[: len(self._match_factors)], kept[len(self._match_factors) :]
 
     def _graph(self, others: list) -> gtsam.NonlinearFactorGraph:
         graph = gtsam.NonlinearFactorGraph()
         anchor = gtsam.noiseModel.Isotropic.Sigma(3, 1e-6)
         graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*self.poses[0]), anchor))
-        for factor in (*self._certain, *others):
+        for factor in (*self._motion_factors, *others):
             graph.add(factor)
         return graph
 
@@ -215,7 +219,7 @@ def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:
 
 
 def _by_qr(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> gtsam.ISAM2:
-    """Slower than Cholesky, whose squares of residuals have twice the digits to lose."""
+    """Solver by QR decomposition: slower than Cholesky but more precise, as it does not square the condition number."""
     solution = gtsam.ISAM2(_incremental("QR"))
     solution.update(graph, values)
     return solution

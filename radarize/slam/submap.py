@@ -1,4 +1,4 @@
-"""A submap: the grid of a few consecutive nodes, in the frame of the first of them."""
+"""Submap: the occupancy grid of consecutive nodes, in the frame of the first of them."""
 
 import zlib
 from dataclasses import dataclass, field
@@ -14,16 +14,17 @@ from radarize.slam.node import Node
 
 @dataclass(eq=False)
 class Submap:
-    """Nodes are added until it holds as many as configured; then it is finished and never changes.
+    """Occupancy grid of consecutive nodes. It is finished when it holds the configured number of nodes, and never
+    changes after that.
 
-    A finished grid is kept packed, about a tenth of a byte a cell, for most cells know nothing. What a search needs is
-    made when it searches, and dropped again.
+    A finished grid is stored compressed, with about a tenth of a byte per cell, as most cells are unknown. It is
+    decompressed on each access.
 
     Attributes:
         config: of the back end.
-        anchor: number of the node whose frame this is.
+        anchor: number of the node whose frame is that of the submap.
         nodes: numbers of all nodes in it.
-        center: middle of the occupied cells, m; known when finished.
+        center: mean of the occupied cells, m; set when it is finished.
     """
 
     config: SlamConfig
@@ -36,7 +37,7 @@ class Submap:
         self.center = np.zeros(2)
 
     def insert(self, number: int, node: Node, pose: Float[np.ndarray, "3"]) -> None:
-        """Add a node at its pose in this submap's frame."""
+        """Insert a node at its pose in the frame of the submap."""
         origins, ends, hits = node.rays
         self._grid.insert(transform(pose, origins), transform(pose, ends), hits, self.config.grid, spread=True)
         self.nodes.append(number)
@@ -50,7 +51,7 @@ class Submap:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The grid, of a finished submap unpacked anew."""
+        """The occupancy grid; decompressed if the submap is finished."""
         if not self._packed:
             return self._grid
         cells = np.frombuffer(zlib.decompress(self._packed), np.uint8).reshape(self._shape)

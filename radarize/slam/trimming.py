@@ -1,6 +1,6 @@
-"""What a session without end may forget: submaps of places that others have shown since.
+"""Selection of the submaps that an endless session removes: those of places that newer submaps cover.
 
-After the idea of Cartographer's trimmer of overlapping submaps, by where nodes stood and looked instead of by cells.
+After Cartographer's trimmer of overlapping submaps, with poses of nodes instead of cells.
 """
 
 from collections import Counter
@@ -11,18 +11,21 @@ from jaxtyping import Float
 
 from radarize.slam.submap import Submap
 
-#: Later submaps that must have been at each of a submap's places; of the two being built none is ever forgotten.
-_ENOUGH = 3
-#: Of places: m, and rad of heading, for a radar sees one side of a wall.
-_SIDE, _SECTOR = 1.0, np.pi / 2
+#: Number of newer submaps that cover each place of a redundant one; it keeps the two submaps being built.
+_MIN_COVER = 3
+#: Size of a place: m, and rad of heading, as a radar sees only one side of a wall.
+_PLACE_SIZE, _PLACE_SECTOR = 1.0, np.pi / 2
 
 
-def needless(submaps: Sequence[Submap], poses: Float[np.ndarray, "node 3"]) -> list[Submap]:
-    """Those at all of whose places enough of the later ones have been that stay."""
+def redundant_submaps(submaps: Sequence[Submap], poses: Float[np.ndarray, "node 3"]) -> list[Submap]:
+    """Return the submaps whose places are all covered by enough newer submaps that stay."""
     seen, found = Counter(), []
     for submap in reversed(submaps):
-        places = {tuple(place) for place in np.floor(poses[submap.nodes] / (_SIDE, _SIDE, _SECTOR)).astype(int)}
-        if all(seen[place] >= _ENOUGH for place in places):
+        places = {
+            tuple(place)
+            for place in np.floor(poses[submap.nodes] / (_PLACE_SIZE, _PLACE_SIZE, _PLACE_SECTOR)).astype(int)
+        }
+        if all(seen[place] >= _MIN_COVER for place in places):
             found.append(submap)
         else:
             seen.update(places)

@@ -1,9 +1,9 @@
-"""Headings from the walls of submaps: most of a building's stand at right angles, or in a few directions.
+"""Heading constraints from wall directions: most walls of a building are at right angles, or have a few directions.
 
-The walls of a submap have the direction along which its points, seen along either axis, pile up most. Where it is one
-that was met before, the two submaps are parallel, or at right angles, however far apart they are and whatever odometry
-has lost in between. Which one it is must hardly be in doubt, so that where walls stand in all directions nothing is
-told; and after a turn that odometry did not see, directions are others than before.
+The wall direction of a submap is the axis on which the projections of its points are most concentrated. If a submap has
+the direction of an earlier one, the two are parallel or at right angles, whatever their distance and whatever the drift
+of odometry between them. The association has to be unambiguous, so there are no constraints where walls have all
+directions. After a rotation that odometry did not observe, new directions are started.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,103 +13,104 @@ import numba
 import numpy as np
 from jaxtyping import Float
 
-from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import associate_direction, from_right_angle
 from radarize.slam.config import WallsConfig
 
-#: rad: directions that are tried, and those that count as the same.
-_TURNS, _SAME = np.radians(np.arange(0, 90, 0.25)), np.radians(8.0)
-#: rad: a heading that is known worse since a direction was met last does not tell right angles apart.
-_LOST = np.radians(15.0)
-#: Points of a submap that are looked at, at most; m and number of the cells that they pile up in; what is farther
-#: apart than all cells begins at the first again.
-_POINTS, _CELL, _CELLS = 2000, 0.05, 1024
+#: Directions that are evaluated, and half width of the peak that the contrast excludes, rad.
+_ANGLES, _PEAK_WIDTH = np.radians(np.arange(0, 90, 0.25)), np.radians(8.0)
+#: Maximum standard deviation of the heading since the last association with a direction, rad; above it right angles are
+#: not distinguished.
+_MAX_HEADING_STD = np.radians(15.0)
+#: Maximum number of points of a submap; size (m) and number of the bins of a projection, which wraps around beyond the
+#: last bin.
+_MAX_POINTS, _BIN_SIZE, _BINS = 2000, 0.05, 1024
 
 
-class Direction(NamedTuple):
-    """Of walls.
+class WallDirection(NamedTuple):
+    """Direction of the walls of a submap.
 
     Attributes:
         angle: of their normals, rad, modulo a right angle.
-        contrast: how much better points pile up than along any other direction.
+        contrast: ratio of the concentration of points in this direction to that in any other direction.
     """
 
     angle: float
     contrast: float
 
     @classmethod
-    def of(cls, points: Float[np.ndarray, "point 2"]) -> "Direction":
-        """Of the walls that some points (m) lie on."""
-        piled = _piled(np.ascontiguousarray(points[:: 1 + len(points) // _POINTS]), _TURNS)
-        best = int(piled.argmax())
-        before, at, after = piled[best - 1], piled[best], piled[(best + 1) % len(piled)]
+    def of(cls, points: Float[np.ndarray, "point 2"]) -> "WallDirection":
+        """Return the wall direction of some points (m)."""
+        concentration = _concentrations(np.ascontiguousarray(points[:: 1 + len(points) // _MAX_POINTS]), _ANGLES)
+        best = int(concentration.argmax())
+        before, at, after = concentration[best - 1], concentration[best], concentration[(best + 1) % len(concentration)]
         between = (before - after) / (2 * (before - 2 * at + after) or 1.0)
-        others = piled[np.abs(past_right_angle(_TURNS - _TURNS[best])) > _SAME]
-        return cls(float(_TURNS[best] + between * (_TURNS[1] - _TURNS[0])), float(at / others.max()))
+        others = concentration[np.abs(from_right_angle(_ANGLES - _ANGLES[best])) > _PEAK_WIDTH]
+        return cls(float(_ANGLES[best] + between * (_ANGLES[1] - _ANGLES[0])), float(at / others.max()))
 
 
 class Walls:
-    """Directions that are remembered, with the nodes in the middle of the submaps whose walls had them."""
+    """Remembered wall directions, with the central nodes of the submaps that have them."""
 
     def __init__(self, config: WallsConfig):
         self.config = config
-        self._known: list[dict[int, float]] = []  # of each direction the angles by node, each as seen from it
+        self._known: list[dict[int, float]] = []  # per direction: angles of walls by node, in the frame of the node
 
-    def meet(
+    def associate(
         self,
         node: int,
         points: Float[np.ndarray, "point 2"],
         headings: Float[np.ndarray, "node"],
         drift: Callable[[int, int], float],
     ) -> tuple[int, float] | None:
-        """Look up the direction of a submap's walls, and remember it.
+        """Associate the walls of a submap with a remembered direction, and remember them.
 
         Args:
             node: in the middle of the submap.
-            points: of the submap, seen from the node, m.
-            headings: of all nodes, as they are known, rad.
-            drift: variance of the turn from one node to another by odometry, rad^2.
+            points: of the submap, in the frame of the node, m.
+            headings: current estimates of all nodes, rad.
+            drift: variance of the rotation between two nodes by odometry, rad^2.
 
         Returns:
-            The first node that had this direction, and the turn from its heading to that of this one, rad; None where
-            nothing is told.
+            The first node with this direction, and the rotation from its heading to that of this node, rad; None if the
+            direction is new or ambiguous.
         """
-        found = Direction.of(points)
+        found = WallDirection.of(points)
         if found.contrast < self.config.contrast or any(node in known for known in self._known):
             return None
         variances = [drift(next(reversed(known)), node) + 2 * self.config.sigma**2 for known in self._known]
-        near = [k for k, variance in enumerate(variances) if variance < _LOST**2]
-        firsts = [next(iter(self._known[k].items())) for k in near]
+        usable = [k for k, variance in enumerate(variances) if variance < _MAX_HEADING_STD**2]
+        firsts = [next(iter(self._known[k].items())) for k in usable]
         expected = np.array([headings[first] + angle for first, angle in firsts])
-        off = past_right_angle(expected - headings[node] - found.angle)
-        number = recognised(off, np.array(variances)[near], [len(self._known[k]) for k in near])
-        if number is None:
+        deviations = from_right_angle(expected - headings[node] - found.angle)
+        index = associate_direction(deviations, np.array(variances)[usable], [len(self._known[k]) for k in usable])
+        if index is None:
             return None
-        if number == len(near):
+        if index == len(usable):
             self._known.append({node: found.angle})
             return None
-        self._known[near[number]][node] = found.angle
-        first = firsts[number][0]
-        return first, float(headings[node] + off[number] - headings[first])
+        self._known[usable[index]][node] = found.angle
+        first = firsts[index][0]
+        return first, float(headings[node] + deviations[index] - headings[first])
 
     def keep(self, place: Mapping[int, int]) -> None:
-        """Forget all nodes but these, which then have other numbers."""
+        """Remove all other nodes; `place` holds the new numbers of those kept."""
         kept = [{place[node]: angle for node, angle in known.items() if node in place} for known in self._known]
         self._known = [known for known in kept if known]
 
 
 @numba.njit(cache=True, nogil=True)
-def _piled(points, turns):
-    """For each turn, by how much points pile up along both axes: sums of the squared numbers of points in cells, each
-    being shared by the two cells next to it."""
-    found, count = np.zeros(len(turns)), np.empty(_CELLS)
-    for k in range(len(turns)):
-        for x, y in ((np.cos(turns[k]), np.sin(turns[k])), (-np.sin(turns[k]), np.cos(turns[k]))):
-            count[:] = 0.0
+def _concentrations(points, angles):
+    """Concentration of the points for each angle: sum of the squared histograms of their projections on both axes, with
+    linear sharing between neighbouring bins."""
+    found, histogram = np.zeros(len(angles)), np.empty(_BINS)
+    for k in range(len(angles)):
+        for x, y in ((np.cos(angles[k]), np.sin(angles[k])), (-np.sin(angles[k]), np.cos(angles[k]))):
+            histogram[:] = 0.0
             for i in range(len(points)):
-                place = (points[i, 0] * x + points[i, 1] * y) / _CELL
+                place = (points[i, 0] * x + points[i, 1] * y) / _BIN_SIZE
                 low = np.floor(place)
-                cell = int(low) % _CELLS
-                count[cell] += 1 - (place - low)
-                count[(cell + 1) % _CELLS] += place - low
-            found[k] += (count**2).sum()
+                cell = int(low) % _BINS
+                histogram[cell] += 1 - (place - low)
+                histogram[(cell + 1) % _BINS] += place - low
+            found[k] += (histogram**2).sum()
     return found

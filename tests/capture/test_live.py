@@ -23,8 +23,8 @@ from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarize.signal.batch import Preprocessor
 from radarize.signal.bearings import BEARINGS
-from radarize.slam.drawing import Drawing
 from radarize.slam.node import Node, Scan
+from radarize.slam.rendering import MapRenderer
 from tests import virtual
 from tests.capture.browser import CHROMIUM, Browser
 from tests.virtual import SMALL, emulated
@@ -238,8 +238,8 @@ def test_the_map_of_an_hour_is_drawn_beside_the_frames(monkeypatch):
             took.append((waited, time.perf_counter() - start))
         assert max(waited for waited, _ in took) < 0.03
         assert took[1][1] < took[0][1] / 5
-        whole = Drawing(config.grid).of(slam.nodes, slam.graph.poses)
-        assert np.array_equal(live._drawing.of(slam.nodes, slam.graph.poses).probability, whole.probability)
+        whole = MapRenderer(config.grid).render(slam.nodes, slam.graph.poses)
+        assert np.array_equal(live._drawing.render(slam.nodes, slam.graph.poses).probability, whole.probability)
         slam.graph._poses.values[:, 0] += 1.0  # a loop is closed: nothing is where it was drawn
-        moved = live._drawing.of(slam.nodes, slam.graph.poses)
+        moved = live._drawing.render(slam.nodes, slam.graph.poses)
         assert moved.origin[0] == pytest.approx(whole.origin[0] + 1.0, abs=2 * config.grid.map_resolution)

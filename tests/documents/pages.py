@@ -9,10 +9,26 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 #: What is read first, and then, by two readers who each have what it left behind, in this order.
 FIRST = "README.md"
-THEN = (
-    ("docs/tutorial.md", "docs/simulating.md", "docs/radar.md", "docs/ros2.md", "docs/physics.md"),
-    ("docs/python.md", "docs/learning.md", "docs/comparing.md"),
+THEN = tuple(
+    tuple(
+        f"docs/{folder}/{name}.md" if folder else f"docs/{name}.md"
+        for folder, names in reader
+        for name in names.split()
+    )
+    for reader in (
+        (
+            ("start", "install simulation map radar"),
+            ("howto", "hardware trajectory building clutter people sensors twin board calibrate capture emulate check"),
+            ("howto", "import export ros2"),
+            ("explain", "simulator odometry slam truth frames"),
+            ("", "physics"),
+            ("about", "results limits faq others trials glossary"),
+        ),
+        (("howto", "python datasets gpu train method compare radarhd sizes troubleshooting"),),
+    )
 )
+#: Pages that are generated, or hold nothing to type.
+APART = ("docs/reference/", "docs/notebooks/")
 PAGES = (FIRST, *THEN[0], *THEN[1])
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 _OWN = re.compile(r"`((?:radarize|radarsim|torchrun|make|python) [^`]+)`")

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from radarize.io.errors import InputError
 from radarize.io.pose import between, compose, exponential
 from radarize.odometry.doppler import DopplerVelocity, Velocities
-from radarize.odometry.integration import LASTING, Odometry, Track, VelocityConfig, VelocityFilter
+from radarize.odometry.integration import CORRELATION_TIME, Odometry, Track, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.odometry.uncertainty import SCALE, ErrorModel
 from radarize.radar.presets import PRESETS
@@ -24,7 +24,7 @@ SIGNAL = Signal(CONFIG)
 
 
 def classical(velocity=None, rotation=None) -> Odometry:
-    """Least squares and a local map, unless told otherwise."""
+    """Odometry by least squares and a local map, or by the given estimators."""
     heatmaps = SIGNAL.heatmaps
     return Odometry(CONFIG, velocity or DopplerVelocity(heatmaps), rotation or MapRotation(heatmaps))
 
@@ -174,31 +174,31 @@ def test_filter_rejects_an_outlier_and_follows_a_step():
     np.testing.assert_allclose(found[-1], velocity[-1], atol=0.02)
 
 
-def test_a_turn_that_nothing_is_seen_of_is_claimed():
+def test_an_unobserved_turn_has_a_large_covariance():
     rng, stamps = np.random.default_rng(6), np.arange(31) * CONFIG.frame_period
 
     def nowhere(t):
         return np.zeros((*t.shape, 3)), np.zeros(t.shape)
 
-    class Sure:
+    class ZeroRotation:
         def estimate(self, batch, velocities):
             return Rotations.independent(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.ones(len(batch), bool))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
-    result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).update(batch(SIGNAL, adc, stamps))
-    # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
+    result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=ZeroRotation())).update(batch(SIGNAL, adc, stamps))
+    # People turn by 20 deg per second and more; and the input is noise, so some frames match by chance.
     assert np.sqrt(result.errors.turns(30)[0]) > np.radians(15)
 
 
-class Told:
-    """Estimators whose answers are known: a velocity straight ahead, a rate of turning."""
+class FixedEstimator:
+    """Estimators with given results: a velocity straight ahead, a yaw rate."""
 
     lag = 0.2
 
     def __init__(self, speed=1.0, rate=0.0, lever=0.0, variance=1e-6):
         self.speed, self.rate, self.lever, self.variance, self.last = speed, rate, lever, variance, 0.0
 
-    def velocity(self) -> "Told":
+    def velocity(self) -> "FixedEstimator":
         self.estimate = lambda batch: Velocities(
             np.tile([self.speed, 0.0], (len(batch), 1)),
             np.tile(self.variance * np.eye(2), (len(batch), 1, 1)),
@@ -207,7 +207,7 @@ class Told:
         )
         return self
 
-    def rotation(self) -> "Told":
+    def rotation(self) -> "FixedEstimator":
         self.estimate = lambda batch, velocities: Rotations.independent(
             self.rate * np.diff(batch.stamps, prepend=batch.stamps[0]),
             np.full(len(batch), 1e-6),
@@ -217,76 +217,79 @@ class Told:
 
 
 def test_the_antennas_swing_about_the_origin():
-    """Their middle is 1 cm to the left: turning to the left at 1.5 rad/s, it goes backward by 1.5 cm/s."""
+    """Their midpoint is 1 cm to the left: at a yaw rate of 1.5 rad/s to the left it moves backward at 1.5 cm/s."""
     times = np.arange(60) * CONFIG.frame_period
-    odometry = Odometry(CONFIG, Told(1.0 - 0.015, lever=0.01).velocity(), Told(rate=1.5).rotation())
+    odometry = Odometry(CONFIG, FixedEstimator(1.0 - 0.015, lever=0.01).velocity(), FixedEstimator(rate=1.5).rotation())
     found = odometry.update(of_spectrum(SIGNAL, times, times))
     assert found.velocity[30:, 0] == pytest.approx(1.0, abs=1e-3)
     antennas = DopplerVelocity(SIGNAL.heatmaps).lever
-    # Eight of them half a wavelength apart, of which each is the sum of a transmitter's place and a receiver's.
+    # Eight virtual antennas half a wavelength apart; each is the sum of the positions of a transmitter and a receiver.
     assert antennas == pytest.approx(3.5 * CONFIG.wavelength / 2 / 2, rel=0.05)
 
 
 @pytest.mark.parametrize("period", [1 / 30, 0.1])
-def test_errors_that_last_add_up_to_what_is_claimed(period):
-    """Velocities wrong by 1 cm/s (RMS) as modelled, for as long as modelled: places over two seconds and more."""
+def test_correlated_errors_add_up_to_the_covariance(period):
+    """Velocity errors of 1 cm/s (RMS) with the modelled correlation: positions over 2 s and more."""
     rng, size, frames = np.random.default_rng(3), 0.01, round(900 / period)
-    kept = np.exp(-period / LASTING)
+    kept = np.exp(-period / CORRELATION_TIME)
     drawn = np.sqrt(1 - kept**2) * rng.normal(size=(frames, 2))
     wrong = size * lfilter([1.0], [1.0, -kept], drawn, axis=0)
-    told, heading = Told(variance=size**2).velocity(), Told().rotation()
-    right = told.estimate
-    told.estimate = lambda batch: replace(right(batch), velocity=right(batch).velocity + wrong)
+    estimator, heading = FixedEstimator(variance=size**2).velocity(), FixedEstimator().rotation()
+    right = estimator.estimate
+    estimator.estimate = lambda batch: replace(right(batch), velocity=right(batch).velocity + wrong)
     times = np.arange(frames) * period
-    found = Odometry(CONFIG, told, heading).update(of_spectrum(SIGNAL, times, times))
+    found = Odometry(CONFIG, estimator, heading).update(of_spectrum(SIGNAL, times, times))
     for span in (2.0, 10.0):
         each = round(span / period)
         ends = found.pose[::each, :2] - np.outer(times[::each], [1.0, 0.0])
         along = found.errors.motions(found.pose, np.arange(len(ends) - 1) * each, each)[:, 0, 0]
-        along -= (SCALE * span) ** 2  # at 1 m/s; nothing is wrong with the scale here, nor with the heading
+        along -= (SCALE * span) ** 2  # at 1 m/s; there is no error of scale or heading here
         assert np.mean(np.diff(ends, axis=0) ** 2 / along[:, None]) == pytest.approx(1, abs=0.3)
 
 
 @pytest.mark.parametrize("gap", [0.2, 0.5, 1.0, 2.0])
-def test_a_gap_is_claimed_by_its_length(gap):
-    """As much as walks by hand change their speed meanwhile; within it, no step claims more than its velocities'."""
+def test_the_covariance_of_a_gap_depends_on_its_length(gap):
+    """It agrees with the changes of speed of handheld walks; steps outside of the gap have the covariance of their
+    velocities."""
     times = np.concatenate([np.arange(10) * CONFIG.frame_period, 9 * CONFIG.frame_period + gap * np.array([1.0])])
-    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).update(of_spectrum(SIGNAL, times, times))
+    found = Odometry(CONFIG, FixedEstimator().velocity(), FixedEstimator().rotation()).update(
+        of_spectrum(SIGNAL, times, times)
+    )
     spread = np.sqrt(np.insert(steps(found)[:, 0, 0], 0, 0.0))
-    by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
-    assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)
+    handheld = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
+    assert spread[10] == pytest.approx(handheld[gap], rel=0.25)
     assert (spread[1:10] < 2e-4).all()
 
 
-def test_an_unknown_turn_leaves_the_direction_unknown():
-    """A turn of 40 deg over a gap of a second, unsure by 6: it adds to what is claimed as poses scatter that turned
-    otherwise."""
-    sigma, told, draws = np.radians(6), np.radians(40), np.random.default_rng(7).normal(size=4000)
+def test_an_uncertain_turn_makes_the_direction_uncertain():
+    """A turn of 40 deg in a gap of 1 s, with a standard deviation of 6 deg: the covariance grows by the scatter of
+    poses with other turns."""
+    sigma, turn, draws = np.radians(6), np.radians(40), np.random.default_rng(7).normal(size=4000)
     found = []
     for spread in (0.0, sigma):
-        turns = Rotations.independent(np.array([0, told]), np.array([0, spread**2]), np.ones(2, bool))
+        turns = Rotations.independent(np.array([0, turn]), np.array([0, spread**2]), np.ones(2, bool))
         rotation = SimpleNamespace(lag=0.0, estimate=lambda *_, turns=turns: turns)
         times = np.array([0.0, 1.0])
-        found.append(Odometry(CONFIG, Told().velocity(), rotation).update(of_spectrum(SIGNAL, times, times)))
-    otherwise = [exponential(np.array([1.0, 0.0]), told + sigma * draw) for draw in draws]
+        found.append(Odometry(CONFIG, FixedEstimator().velocity(), rotation).update(of_spectrum(SIGNAL, times, times)))
+    otherwise = [exponential(np.array([1.0, 0.0]), turn + sigma * draw) for draw in draws]
     scatter = np.cov(np.stack([between(found[0].step[1], each) for each in otherwise]).T)
     assert np.abs(steps(found[1])[0] - steps(found[0])[0] - scatter).max() < 0.15 * scatter[1, 2]
 
 
 @pytest.mark.parametrize("rate", [5, 15, 30])
-def test_velocity_is_forgotten_by_the_second_not_by_the_frame(rate):
+def test_the_random_walk_of_velocity_does_not_depend_on_the_frame_rate(rate):
     count = rate + 1
-    blind = np.arange(count) > 0
-    covariance = np.where(blind, 1e9, 1e-6)[:, None, None] * np.eye(2)
-    measured = Velocities(np.zeros((count, 2)), covariance, np.where(blind, 0, 50), ~blind)
+    unobserved = np.arange(count) > 0
+    covariance = np.where(unobserved, 1e9, 1e-6)[:, None, None] * np.eye(2)
+    measured = Velocities(np.zeros((count, 2)), covariance, np.where(unobserved, 0, 50), ~unobserved)
     filtered = VelocityFilter().filter(np.arange(count) / rate, measured)
     assert filtered.covariance[-1, 0, 0] == pytest.approx(VelocityConfig().wander ** 2, rel=1e-3)
-    assert (filtered.seen == ~blind).all()
+    assert (filtered.seen == ~unobserved).all()
 
 
 @pytest.mark.parametrize("fastest", [0.5, 2.0, 6.0])
-def test_a_velocity_not_known_at_all_is_as_fast_as_configured(fastest):
-    """The first measurement, as uncertain as what is known before, halves the variance."""
+def test_the_prior_of_velocity_is_the_configured_one(fastest):
+    """The first measurement, with the covariance of the prior, halves the variance."""
     measured = Velocities(np.array([[1.0, 0.0]]), fastest**2 * np.eye(2)[None], np.ones(1, int), np.ones(1, bool))
     found = VelocityFilter(VelocityConfig(fastest=fastest)).filter(np.zeros(1), measured)
     assert found.covariance[0] == pytest.approx(fastest**2 / 2 * np.eye(2))

@@ -1,4 +1,5 @@
-"""Covariances of motions, beside walks whose errors are drawn from the model, and least squares over all frames."""
+"""Covariances of motions, compared with walks whose errors are drawn from the model, and with least squares over all
+frames."""
 
 import numpy as np
 import pytest
@@ -13,8 +14,8 @@ DT = 1 / 30
 
 
 def model(kept: float, heading: float, noise: np.ndarray, lasting: float = 0.0, velocity: float = 0.0) -> ErrorModel:
-    """Steps with noise along, across (m) and of their turn (rad); a heading's error of which `kept` goes on, to which
-    `heading` (rad) comes; velocities' errors (m/s) of which `lasting` goes on."""
+    """Error model: steps with noise along, across (m) and of yaw (rad); heading errors with correlation `kept` and
+    added noise `heading` (rad); velocity errors (m/s) with correlation `lasting`."""
     cos, sin = np.cos(TURN / 2), np.sin(TURN / 2)
     aside = np.array([[cos, sin], [-sin, cos]]) @ np.diag(noise[:2])
     covariance, variance = np.zeros((FRAMES, 3, 3)), np.zeros((FRAMES, 3, 3))
@@ -27,7 +28,7 @@ def model(kept: float, heading: float, noise: np.ndarray, lasting: float = 0.0, 
 
 
 def drawn(errors: ErrorModel, noise: np.ndarray, rng) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of a walk in a curve, and of many odometries of it: (frame, 3), (frame, walk, 3)."""
+    """Poses of a walk in a curve, and of many estimates of it: (frame, 3), (frame, walk, 3)."""
     true, found = np.zeros((FRAMES, 3)), np.zeros((FRAMES, WALKS, 3))
     heading, velocity = np.zeros(WALKS), np.sqrt(errors.variance[0, 1, 1]) * rng.normal(size=(WALKS, 2))
     for k in range(1, FRAMES):
@@ -37,7 +38,7 @@ def drawn(errors: ErrorModel, noise: np.ndarray, rng) -> tuple[np.ndarray, np.nd
         velocity = lasting * velocity + np.sqrt((1 - lasting**2) * variance[k, 1, 1]) * rng.normal(size=(WALKS, 2))
         turned = TURN + (heading - before) + noise[2] * rng.normal(size=WALKS)
         way = WAY + DT * (faster + velocity) / 2 + rng.normal(size=(WALKS, 2)) * noise[:2]
-        # Half of the turn before the way, and half after it: nothing of `half_turned`.
+        # Half of the rotation before the translation, and half after it: independent of `half_turned`.
         cos, sin = np.cos(turned / 2), np.sin(turned / 2)
         moved = np.stack([cos * way[:, 0] - sin * way[:, 1], sin * way[:, 0] + cos * way[:, 1], turned], axis=1)
         true[k] = compose(true[k - 1], STEP)
@@ -57,22 +58,22 @@ def drawn(errors: ErrorModel, noise: np.ndarray, rng) -> tuple[np.ndarray, np.nd
     ],
 )
 def test_motions_scatter_as_modelled(errors, start):
-    """Errors of headings that are soon corrected, slowly, or never, and of velocities: over a few steps and many."""
+    """Heading errors that are corrected soon, slowly or never, and velocity errors: over a few steps and many."""
     noise = np.array([0.002, 0.001, 0.002])
     known = model(noise=noise, **errors)
     true, found = drawn(known, noise, np.random.default_rng(3))
     for length in (1, 8, FRAMES - 1 - start):
         ends = start, start + length
-        off = between(between(*true[[*ends]]), between(found[ends[0]], found[ends[1]]))
-        covariance, scatter = _motion(known, true, start, length), np.cov(off.T)
+        error = between(between(*true[[*ends]]), between(found[ends[0]], found[ends[1]]))
+        covariance, scatter = _motion(known, true, start, length), np.cov(error.T)
         sizes = np.sqrt(np.outer(np.diag(scatter), np.diag(scatter)))
         assert np.abs((covariance - scatter) / sizes).max() < 0.04
-        nees = (off * np.linalg.solve(covariance, off.T).T).sum(axis=1).mean() / 3
+        nees = (error * np.linalg.solve(covariance, error.T).T).sum(axis=1).mean() / 3
         assert nees == pytest.approx(1, abs=0.05)
 
 
 def _motion(errors: ErrorModel, poses: np.ndarray, start: int, length: int) -> np.ndarray:
-    """Covariance of a motion, without an error of scale."""
+    """Covariance of a motion, without scale error."""
     found = MotionCovariance(errors.variance[start], scale=0.0)
     for k in range(start + 1, start + length + 1):
         found.step(between(poses[k - 1], poses[k]), errors[k])
@@ -80,14 +81,14 @@ def _motion(errors: ErrorModel, poses: np.ndarray, start: int, length: int) -> n
 
 
 def test_against_least_squares_over_all_frames():
-    """Along a line: the covariance of the way is that of one linear system for the errors of all frames at once."""
+    """On a straight line: the covariance of the position is that of one linear system for the errors of all frames."""
     rng, start, length = np.random.default_rng(1), 7, 40
     lasting, deviation = rng.uniform(0.5, 0.9, FRAMES), np.full(FRAMES, 0.05)
     errors = model(1.0, 0.0, np.array([0.002, 0.001, 0.0]), velocity=0.05)
     errors.correlation[:, 1] = lasting
-    poses = np.zeros((FRAMES, 3))  # looks ahead all the time
+    poses = np.zeros((FRAMES, 3))  # the heading is constant
     errors.noise[1:] = np.diag([0.002, 0.001, 0.0]) ** 2
-    # Unknowns: velocity errors at the frames of the window, and the way; rows: how each goes on.
+    # Unknowns: velocity errors at the frames of the window; rows: how each follows from the previous one.
     velocities = length + 1
     rows, weights = [np.eye(velocities)[0]], [1 / deviation[start] ** 2]
     for k in range(1, velocities):
@@ -99,8 +100,9 @@ def test_against_least_squares_over_all_frames():
     assert np.diag(_motion(errors, poses, start, length))[:2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_what_is_corrected_is_no_drift():
-    """As headings hold their error, a turn over any time has twice its variance, and one step little of it."""
+def test_a_corrected_heading_error_is_no_drift():
+    """With a stationary heading error, the variance of a long rotation is twice that of the error, and of one step a
+    small part of it."""
     variance = np.zeros((FRAMES, 3, 3))
     variance[:, 0, 0] = 0.01**2
     errors = ErrorModel(np.full(FRAMES, DT), np.zeros((FRAMES, 3, 3)), np.tile([0.9, 0.0], (FRAMES, 1)), variance)
@@ -115,7 +117,7 @@ def test_independent_steps_add_up():
     np.testing.assert_allclose(found, np.tile(16 * covariance[0], (2, 1, 1)), rtol=1e-12)
 
 
-def test_an_error_of_scale_is_along_the_way():
+def test_scale_error_is_along_the_path():
     motion, exact = MotionCovariance(np.zeros((3, 3))), ErrorModel.independent(np.zeros((3, 3)))
     for _ in range(50):
         motion.step(np.array([0.0, 0.2, 0.0]), exact)
@@ -126,7 +128,7 @@ def test_an_error_of_scale_is_along_the_way():
 
 @pytest.fixture
 def walk() -> tuple[np.ndarray, ErrorModel]:
-    """Poses, and errors that change from step to step."""
+    """Poses, and errors that vary from step to step."""
     rng = np.random.default_rng(0)
     poses = np.cumsum(rng.normal(size=(FRAMES, 3)) * 0.05, axis=0)
     noise, variance = rng.uniform(1e-5, 2e-5, (FRAMES, 1, 1)) * np.eye(3), np.zeros((FRAMES, 3, 3))
@@ -135,13 +137,13 @@ def walk() -> tuple[np.ndarray, ErrorModel]:
 
 
 @pytest.mark.parametrize("length", [1, 7, FRAMES - 1])
-def test_turns_are_those_of_motions(walk, length):
+def test_rotations_agree_with_motions(walk, length):
     poses, errors = walk
     motions = errors.motions(poses, np.arange(FRAMES - length), length)
     np.testing.assert_allclose(errors.turns(length), motions[:, 2, 2], rtol=1e-9)
 
 
-def test_a_window_of_many_is_as_alone(walk):
+def test_windows_are_independent_of_each_other(walk):
     poses, errors = walk
     starts = np.array([0, 7, 30])
     together = errors.motions(poses, starts, 20)
@@ -149,8 +151,8 @@ def test_a_window_of_many_is_as_alone(walk):
     np.testing.assert_allclose(errors.since_start(poses)[20], together[0], rtol=1e-9)
 
 
-def test_halves_of_a_step_make_it_up():
-    """Of noise, which grows with time."""
+def test_a_step_is_the_sum_of_its_halves():
+    """Noise grows with time."""
     errors = model(0.9, 0.01, np.array([0.002, 0.001, 0.002]))[30]
     half = errors.part(0.5)
     assert half.part(1.0).noise == pytest.approx(errors.noise / 2)

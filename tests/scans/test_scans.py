@@ -19,14 +19,14 @@ def noise(frames=1):
 
 
 def echo(distance, azimuth, power, width=0.14):
-    """A blob one range bin and one beam wide (Gaussian in range: parabolic in log power)."""
+    """An echo one range bin and one beam wide (Gaussian in range: parabolic in log power)."""
     along = np.exp(-(((RANGES - distance) / 0.0446) ** 2))
     across = np.exp(-(((AZIMUTHS - azimuth) / width) ** 2) / 2)
     return power * along[:, None] * across
 
 
 def make_scans(power, ranges, azimuths, aware=None, *, method="elevation-aware"):
-    """From maps on some axes."""
+    """Scans from maps on given axes."""
     axes = SimpleNamespace(ranges=ranges, azimuths=azimuths)
     return Maps.of(axes, ScanConfig(), [power] if aware is None else [power, aware, power]).scans(method)
 
@@ -85,7 +85,8 @@ def test_narrow_maps_leave_outer_bearings_empty():
 
 
 def test_cfar_returns_the_strongest_cell_above_its_neighbours_both_ways():
-    """Against loops over cells, and beside an echo as wide as the field of view, which no bearing's CFAR lets pass."""
+    """Compared with loops over cells; and an echo as wide as the field of view is rejected by the CFAR over
+    bearings."""
     inside = np.abs(AZIMUTHS[:, None] - BEARINGS).argmin(axis=0)
     power = noise() * 10 ** RNG.uniform(0, 2, (1, len(RANGES), len(AZIMUTHS)))
     config, level = ScanConfig(), 10 * np.log10(power[0][:, inside])

@@ -1,4 +1,4 @@
-"""Scans from occupancy: where the first surface is, and what the threshold does."""
+"""Scans from occupancy probabilities: position of the first surface, and effect of the threshold."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ from radarize.learning.nets.weights import Header, build, example, save
 from radarize.pipeline.method import Inputs
 from radarize.pipeline.networked import segmentation
 from radarize.radar.presets import PRESETS
-from radarize.scans.segmentation import NEAR, OUTERMOST, SegmentationScans, at_middles, first_surface
+from radarize.scans.segmentation import EDGE_OFFSET, HALF_WIDTH, SegmentationScans, at_column_centers, first_surface
 from radarize.signal.batch import Preprocessor, Signal
 from radarize.signal.bearings import BEARINGS
 from radarsim.sensors.scan import RAYS, Cell, Occupancy
@@ -23,8 +23,8 @@ from tests.io.importers.public import captures
 CONFIG = PRESETS["radarize"]
 
 
-class Says:
-    """A network with one answer."""
+class FixedNetwork:
+    """A network with a constant output."""
 
     def __init__(self, likely: np.ndarray):
         self.likely = torch.tensor(likely)
@@ -33,8 +33,9 @@ class Says:
         return self.likely.expand(len(maps), -1, -1)
 
 
-def test_the_first_surface_is_where_it_is_likeliest():
-    """Against loops over cells: the distribution of the first occupied cell, and its likeliest five cells in a row."""
+def test_first_surface_against_a_loop():
+    """Compared with loops over cells: the distribution of the first occupied cell, and its most likely window of five
+    cells."""
     likely = np.random.default_rng(0).beta(0.05, 0.5, (2, 30, 4))
     found = first_surface(likely, 0.4)
     for frame in range(2):
@@ -43,7 +44,7 @@ def test_the_first_surface_is_where_it_is_likeliest():
             for h in likely[frame, :, bearing]:
                 first.append(h * left)
                 left *= 1 - h
-            rows = [range(max(0, k - NEAR), min(30, k + NEAR + 1)) for k in range(30)]
+            rows = [range(max(0, k - HALF_WIDTH), min(30, k + HALF_WIDTH + 1)) for k in range(30)]
             mass = [sum(first[i] for i in row) for row in rows]
             best = int(np.argmax(mass))
             expected = sum(i * first[i] for i in rows[best]) / mass[best] if mass[best] >= 0.4 else np.inf
@@ -51,42 +52,42 @@ def test_the_first_surface_is_where_it_is_likeliest():
 
 
 @pytest.mark.parametrize("degrees", [0, 30, 60, -60])
-def test_walls_at_an_angle_are_where_they_are(degrees):
-    """A network that says what the label says has ranges of a column's middle, not of its nearest ray: at 60 degrees
-    those are 2 cm less."""
+def test_ranges_of_oblique_walls(degrees):
+    """With the label as output of the network, ranges are those at the centre of a column, not of its nearest ray; at
+    60 deg the difference is 2 cm."""
     normal, away = np.deg2rad(degrees), np.linspace(0.8, 1.4, 60)[:, None]
     label = Occupancy.label(
         SimpleNamespace(scenario=SimpleNamespace(config=CONFIG)), wall(away[..., None], normal, RAYS)
     )
-    told = first_surface(np.where(label == Cell.SURFACE, 0.99, 1e-4), 0.5)
-    ranges, true = told * CONFIG.range_resolution - CONFIG.range_bias, wall(away, normal, BEARINGS)
+    found = first_surface(np.where(label == Cell.SURFACE, 0.99, 1e-4), 0.5)
+    ranges, true = found * CONFIG.range_resolution - CONFIG.range_bias, wall(away, normal, BEARINGS)
     there = np.isfinite(ranges) & (true < 4)
-    off, before = at_middles(ranges)[there] - true[there], ranges[there] - true[there]
-    assert abs(off.mean()) < 0.001
-    assert np.sqrt(np.mean(off**2)) == pytest.approx(CONFIG.range_resolution / 12**0.5, rel=0.05)  # of whole bins
+    error, before = at_column_centers(ranges)[there] - true[there], ranges[there] - true[there]
+    assert abs(error.mean()) < 0.001
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(CONFIG.range_resolution / 12**0.5, rel=0.05)  # whole bins
     assert abs(degrees) < 60 or before.mean() < -0.015
 
 
 def test_the_outermost_ray_is_the_labels():
-    assert RAYS.max(axis=1) - BEARINGS == pytest.approx(OUTERMOST * np.diff(BEARINGS)[0])
+    assert RAYS.max(axis=1) - BEARINGS == pytest.approx(EDGE_OFFSET * np.diff(BEARINGS)[0])
 
 
 def wall(away, normal, bearings):
-    """Ranges of a plane so far away, m, whose normal has a bearing."""
+    """Ranges of a plane at a distance, m, whose normal has the given bearing."""
     across = np.cos(bearings - normal)
     return np.where(across > 0.05, away / np.maximum(across, 0.05), 100.0)
 
 
-def test_no_step_between_two_things_is_a_wall():
+def test_a_step_in_range_is_no_wall():
     ranges = np.array([[1.0, 1.1, 1.2, 3.0, np.inf, 2.0, 2.0, np.inf]])
     expected = [[1 + 0.0375, 1.1 + 0.0375, 1.2 + 0.0375, 3.0, np.inf, 2.0, 2.0, np.inf]]
-    assert at_middles(ranges) == pytest.approx(np.array(expected))
-    assert at_middles(ranges[:, ::-1]) == pytest.approx(np.array(expected)[:, ::-1])
+    assert at_column_centers(ranges) == pytest.approx(np.array(expected))
+    assert at_column_centers(ranges[:, ::-1]) == pytest.approx(np.array(expected)[:, ::-1])
 
 
 @pytest.fixture
 def untrained(tmp_path):
-    """Weights that say nothing."""
+    """Weights of an untrained network."""
     header = Header(
         kind="segmentation", frames=1, maps=("range_azimuth", "elevation_aware"), width=2,
         grid=MapGrid.of(CONFIG, "range_azimuth"),
@@ -108,20 +109,20 @@ def test_ghosts_behind_a_surface_and_guesses_are_not_returned(untrained):
     likely[0, 29:32, 10] = 0.4, 0.8, 0.5  # a surface
     likely[0, 60, 10] = 0.99  # a ghost behind it
     likely[0, 40, 20] = 0.45  # a guess
-    scans._net = Says(likely)
+    scans._net = FixedNetwork(likely)
     found = scans.extract(batch)
     step = ranges[1] - ranges[0]
     assert np.allclose(found[:, 10], ranges[30], atol=step / 2)
     assert np.isinf(found[:, 20]).all() and np.isfinite(found).sum() == 2
     assert first_surface(likely, 0.4)[0, 20] == pytest.approx(40, abs=0.5)
     alone = SegmentationScans(CONFIG, untrained, first=False)
-    alone._net = Says(likely)
+    alone._net = FixedNetwork(likely)
     found = alone.extract(batch)
     assert np.allclose(found[:, 10], ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2
 
 
-class Echoes:
-    """Scans that are given."""
+class FixedScans:
+    """Scan extractor with given ranges."""
 
     def __init__(self, ranges: np.ndarray):
         self.ranges = ranges
@@ -130,31 +131,31 @@ class Echoes:
         return np.tile(self.ranges, (len(batch), 1))
 
 
-def test_a_radar_that_sees_farther_has_echoes_beyond_the_network(untrained):
-    """Ranges mean metres whatever the radar's bins; an echo that is nearer is the network's to tell."""
+def test_echoes_beyond_the_range_of_the_network(untrained):
+    """Ranges are in metres whatever the range bins of the radar; nearer echoes are left to the network."""
     radar = PRESETS["long-range"]
-    told = np.full(len(BEARINGS), np.inf)
-    told[[10, 20, 30]] = 8.0, 9.0, 3.0
+    far = np.full(len(BEARINGS), np.inf)
+    far[[10, 20, 30]] = 8.0, 9.0, 3.0
     likely = np.full((1, CONFIG.samples, len(BEARINGS)), 1e-4)
     likely[0, 44:47, 10] = 0.4, 0.9, 0.4
     signal = Signal(radar)
     batch = of_spectrum(
         signal, torch.zeros(2, radar.samples, radar.loops, 12, dtype=torch.complex64), np.arange(2) / 30
     )
-    scans = SegmentationScans(radar, untrained, beyond=Echoes(told))
-    scans._net = Says(likely)
+    scans = SegmentationScans(radar, untrained, beyond=FixedScans(far))
+    scans._net = FixedNetwork(likely)
     found = scans.extract(batch)
     assert np.allclose(found[:, 10], 45 * CONFIG.range_resolution, atol=0.5 * CONFIG.range_resolution)
     assert (found[:, 20] == 9.0).all() and np.isinf(found[:, 30]).all() and np.isfinite(found).sum() == 4
-    near = SegmentationScans(CONFIG, untrained, beyond=Echoes(told))  # which sees no farther than the network
-    near._net = Says(likely)
+    near = SegmentationScans(CONFIG, untrained, beyond=FixedScans(far))  # no range beyond the network's
+    near._net = FixedNetwork(likely)
     batch = of_spectrum(Signal(CONFIG), torch.zeros(1, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64), [0.0])
     assert np.isfinite(near.extract(batch)).sum() == 1
 
 
 def test_documented_echoes_of_real_captures_are_seen(recordings, tmp_path):
-    """By the shipped network, which has seen neither these radars nor any real frame: ahead of a 60 GHz board something
-    at 1.57 m, and before a 77 GHz board two people at 2.93 m, and nothing else."""
+    """With the shipped network, which is trained on neither these radars nor real frames: an object at 1.57 m ahead of
+    a 60 GHz board, and two people at 2.93 m in front of a 77 GHz board, and nothing else."""
     found = {}
     for name, path in captures(recordings, tmp_path).items():
         if name != "pcap":  # one antenna

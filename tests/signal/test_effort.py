@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from radarize.cli import app
 from radarize.io.recording import RecordingWriter
-from radarize.odometry.rotation import MapRotation, _essence
+from radarize.odometry.rotation import MapRotation, _reduce_doppler
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS
 from radarize.signal.effort import effort, together
@@ -45,13 +45,13 @@ def test_the_strongest_of_neighbouring_speeds_are_what_is_left():
     """By brute force; and a frame of as few speeds as the preset's is left as it is."""
     rng = np.random.default_rng(0)
     cells = (rng.normal(size=(2, 3, 200, 6)) + 1j * rng.normal(size=(2, 3, 200, 6))).astype(np.complex64)
-    left = _essence(torch.as_tensor(cells)).numpy()
+    left = _reduce_doppler(torch.as_tensor(cells)).numpy()
     assert left.shape == (2, 3, 50, 6)
     for frame, reach, group in np.ndindex(2, 3, 50):
         four = cells[frame, reach, 4 * group : 4 * group + 4]
         assert np.array_equal(left[frame, reach, group], max(four, key=lambda each: (abs(each[:4]) ** 2).sum()))
     few = torch.as_tensor(cells[:, :, :64])
-    assert _essence(few) is few
+    assert _reduce_doppler(few) is few
 
 
 def test_it_is_said_before(tmp_path):

@@ -1,4 +1,4 @@
-"""The whole back end: synthetic loops, real lidar, and input that is not as it should be."""
+"""The whole back end: synthetic loops, real lidar, and invalid input."""
 
 import tracemalloc
 from dataclasses import replace
@@ -64,7 +64,7 @@ def test_map_shows_the_walls_where_they_are(lidar_lap):
     grid = slam.map()
     rows, columns = np.nonzero(grid.probability > 0.65)
     points = np.stack([columns, rows], axis=-1) * grid.resolution + grid.origin + grid.resolution / 2
-    # Only the first pose ties the map to the world: what is left of its heading error is turned out first.
+    # Only the first pose fixes the map to the world, so the error of its heading is removed first.
     turn, shift = align(truth, slam.trajectory()[1])
     points = points @ turn.T + shift
     walls = ring()
@@ -75,7 +75,7 @@ def test_map_shows_the_walls_where_they_are(lidar_lap):
     free = grid.cells((np.array([[6.0, 1.5], [10.5, 6.0], [1.5, 6.0]]) - shift) @ turn)
     assert (grid.probability[free[:, 0], free[:, 1]] < 0.3).all()
     inside = grid.cells((np.array([[6.0, 6.0]]) - shift) @ turn)[0]
-    assert grid.probability[tuple(inside)] == 0  # behind walls nobody knows
+    assert grid.probability[tuple(inside)] == 0  # unknown behind walls
 
 
 def radar_walk(corners, rng, drop=0.5):
@@ -102,7 +102,7 @@ def test_loop_with_radar():
 
 
 def test_the_last_node_is_searched():
-    """There a walk closes, whatever the number of its nodes."""
+    """A loop may close with the last node, whatever the number of nodes."""
     rng = np.random.default_rng(3)
     truth, azimuths, scans = radar_walk([*LOOP[:5], (4.5, 1.5)], rng)
     odometry, counts = drifting(truth, rng, 0.01, 0.02, bias=0.03), set()
@@ -152,11 +152,11 @@ def test_real_lidar_log():
 
 
 @pytest.mark.skipif(not RADISH.is_dir(), reason=f"no real lidar logs at {RADISH}")
-def test_loops_missed_on_the_way_are_found_in_the_end():
+def test_missed_loops_are_found_at_the_end():
     log = Log.read(RADISH / "csail.scans.npz", RADISH / "csail.odometry.tum")
     count, rng = len(log.times), np.random.default_rng(7)
     rng.permutation(count - 1)
-    # A third of the scans lost, and with them, as these draws fall, a loop within the search window.
+    # A third of the scans is removed, and with them, for this seed, a loop within the search window.
     kept = np.sort(rng.permutation(count)[: 2 * count // 3])
     slam = Slam()
     replace(log, times=log.times[kept], ranges=log.ranges[kept]).feed(slam)
@@ -164,11 +164,11 @@ def test_loops_missed_on_the_way_are_found_in_the_end():
     assert ate(truth, slam.trajectory()[1]) < 0.3
 
 
-# --- input that is not as it should be ------------------------------------------------------------
+# --- invalid input -----------------------------------------------------------------------------------
 AZIMUTHS = np.radians(np.arange(-90.0, 90.0, 2.0))
 
 
-def test_nothing_at_all():
+def test_no_input():
     slam = Slam()
     slam.finish()
     times, poses = slam.trajectory()
@@ -191,7 +191,7 @@ def test_scans_without_odometry_are_matched_to_each_other():
     slam = Slam()
     for k, pose in enumerate(truth):
         slam.add_scan(float(k), azimuths, scan(room, pose, azimuths))
-    assert len(slam.trajectory()[0]) == 0  # they wait
+    assert len(slam.trajectory()[0]) == 0  # scans wait for odometry
     slam.finish()
     _, poses = slam.trajectory()
     assert len(poses) == 12
@@ -210,7 +210,7 @@ def test_empty_and_nan_scans_follow_odometry():
     np.testing.assert_allclose(poses, [[k, 0.5 * k, 0.1] for k in range(9)], atol=1e-6)
 
 
-def test_late_entries_are_left_out_and_counted():
+def test_late_entries_are_dropped_and_counted():
     slam = Slam()
     for time in (0.0, 1.0, 0.5, 1.0, 2.0):
         slam.add_odometry(time, np.array([time, 0, 0]))
@@ -269,7 +269,7 @@ def test_presets_survive_a_round_trip(name):
 
 
 def test_standing_still_takes_no_nodes_and_hardly_any_memory():
-    """An hour at 30 Hz would take less than 20 MB, by the slope; and whoever walks on finds the map where it was."""
+    """Less than 20 MB per hour at 30 Hz, by the slope; and the map stays valid for the walk after it."""
     config, rng = SlamConfig.preset("radar"), np.random.default_rng(0)
     azimuths = np.radians(np.linspace(-44, 44, 12))
     wall = 3 / np.cos(azimuths)
@@ -290,7 +290,7 @@ def test_standing_still_takes_no_nodes_and_hardly_any_memory():
     assert (taken[899] - taken[300]) / 599 * 108_000 < 20e6
     assert len(slam.nodes) == 1
     spread = slam.odometry.motion(slam.nodes[0].time, 899 / 30)[1]
-    assert spread[0, 0] == pytest.approx(900e-6, rel=0.1)  # no step's covariance is forgotten
+    assert spread[0, 0] == pytest.approx(900e-6, rel=0.1)  # the covariances of all steps are included
     for k in range(900, 960):
         push(k, np.array([0.02, 0, 0]))
     slam.finish()

@@ -1,4 +1,4 @@
-"""What compiled loops index with is finite and bounded before it gets there."""
+"""Inputs of compiled loops are finite and bounded."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ AHEAD = np.zeros(3)
 
 @pytest.mark.parametrize("increment", [1e308, 1e300, 1e7, -1e7, np.finfo(float).max])
 def test_angles_of_a_log(tmp_path, increment):
-    """1e308 once indexed a kernel's grid out of its bounds."""
+    """Without the check, 1e308 would index a grid out of bounds."""
     fields = {"angle_min": -1.0, "angle_increment": increment, "range_max": 10.0}
     np.savez(tmp_path / "a.npz", ranges=np.ones((6, 40)), **fields)
     with pytest.raises(InputError, match="azimuth .* expected within"):
@@ -36,7 +36,7 @@ def test_odometry(worst):
 
 
 def test_a_walk_to_the_farthest_that_is_allowed():
-    """Is refused for its map, and not after it has taken the memory."""
+    """The map is rejected before its memory is allocated."""
     slam = Slam(SlamConfig(grid=GridConfig(min_range=0.1)))
     azimuths = np.linspace(-2, 2, 90)
     with pytest.raises(InputError, match="a map of .* would be needed"):

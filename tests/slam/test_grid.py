@@ -1,4 +1,4 @@
-"""Occupancy grids against brute force and an independent reader."""
+"""Occupancy grids compared with brute force and an independent reader."""
 
 import numpy as np
 import pytest
@@ -78,8 +78,8 @@ def test_growing_keeps_what_is_known():
 
 
 @pytest.mark.parametrize("spread", [False, True])
-def test_hits_on_the_edge_of_what_the_grid_holds(spread):
-    # Rays that creep outwards end in every last row and column before the grid grows.
+def test_hits_on_the_edge_of_the_grid(spread):
+    # Rays of increasing length end in every last row and column before the grid grows.
     grid = OccupancyGrid.empty(0.1)
     for reach in np.arange(0.5, 9.0, 0.07):
         for direction in np.array([[1, 0], [0, 1], [-1, 0], [0, -1], [0.7, 0.7], [-0.7, -0.7]]):
@@ -89,7 +89,7 @@ def test_hits_on_the_edge_of_what_the_grid_holds(spread):
             assert np.abs(reached).max() < reach + 0.16  # nothing wraps around
 
 
-def test_map_files_put_y_up_and_know_the_unknown(tmp_path):
+def test_map_files_have_y_up_and_unknown_cells(tmp_path):
     grid = OccupancyGrid.empty(0.1)
     # A wall to the north-east, seen from the origin: lower left free, upper right occupied.
     for _ in range(5):

@@ -1,4 +1,4 @@
-"""Matching and correlative search: known offsets, both signs, and agreement with brute force."""
+"""Matching and correlative search: known offsets of both signs, and agreement with brute force."""
 
 import itertools
 
@@ -12,7 +12,7 @@ from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import interpolate, match, thin
 from tests.slam.world import box, ring, scan
 
-# Off the grid's raster: a wall on the very edge of two cells is drawn into either of them by rounding.
+# Shift off the raster of the grid: rounding decides for a wall exactly between two cells.
 SHIFT = np.array([0.03, 0.036])
 WALLS = ring() + np.tile(SHIFT, 2)
 AZIMUTHS = np.radians(np.arange(-90.0, 90.0, 0.5))
@@ -66,7 +66,7 @@ def test_gradient_of_the_interpolation():
         assert 0 <= value <= 2 * plane.max() - 1
 
 
-def test_information_is_blind_along_a_corridor_and_the_prior_holds():
+def test_the_prior_holds_along_a_corridor():
     walls = np.array([[-100.0, -1.01, 100, -1.01], [-100, 1.02, 100, 1.02]])
     grid = submap(np.array([[0.1 * k, 0.0, 0.0] for k in range(8)]), walls)
     points = thin(hits(np.zeros(3), walls), 0.05)
@@ -77,7 +77,7 @@ def test_information_is_blind_along_a_corridor_and_the_prior_holds():
     assert result.information[0, 0] < 0.2 * result.information[1, 1]
 
 
-def test_search_finds_what_trying_everything_finds():
+def test_search_agrees_with_brute_force():
     rng = np.random.default_rng(5)
     truth = np.array([1.9, 1.5, 0.2])
     points = hits(truth, noise=0.03, rng=rng)[::6]
@@ -102,15 +102,15 @@ def test_search_finds_what_trying_everything_finds():
                 assert np.hypot(*(found[0] - truth)[:2]) < 0.1 and abs(found[0][2] - truth[2]) < 0.03
 
 
-def test_a_wall_seen_from_its_other_side_is_another_wall():
+def test_the_other_side_of_a_wall_does_not_match():
     corridor = np.array([[-5.0, -1.01, 5.0, -1.01], [-5.0, 1.01, 5.0, 1.01]])
     left, right = corridor[1:], corridor[:1]
-    grid = submap(np.array([[0.2 * k, 0.0, 0.0] for k in range(5)]), right)  # only the right one was seen
+    grid = submap(np.array([[0.2 * k, 0.0, 0.0] for k in range(5)]), right)  # only the right wall was seen
     ends = hits(np.zeros(3), left)
     fronts = ends * (1 - 0.25 / np.linalg.norm(ends, axis=1))[:, None]
     window = {"distance": 2.5, "angle": 0.1, "min_score": 0.5}
-    lured = search(Pyramid.of(grid, 5, 2.5), ends, np.zeros(3), **window)
-    assert lured is not None and lured[0][1] == pytest.approx(-2.02, abs=0.1)  # it fits, two metres off
+    wrong = search(Pyramid.of(grid, 5, 2.5), ends, np.zeros(3), **window)
+    assert wrong is not None and wrong[0][1] == pytest.approx(-2.02, abs=0.1)  # it fits, with an error of 2 m
     pyramid = Pyramid.of(grid, 5, 2.5, free=True)
     assert search(pyramid, ends, np.zeros(3), fronts=fronts, **window) is None
     ends = hits(np.zeros(3), right)
@@ -120,7 +120,7 @@ def test_a_wall_seen_from_its_other_side_is_another_wall():
 
 
 def spread(walls, seen, pose, sigma=1.0):
-    """Scatter of points (n, 2), seen from the pose, in a submap of walls drawn as points (n, 2)."""
+    """Scatter of points (n, 2), seen from the pose, in a submap of walls given as points (n, 2)."""
     grid = OccupancyGrid.empty(0.05)
     for _ in range(4):
         grid.insert(np.zeros_like(walls), walls, np.ones(len(walls), bool), CONFIG, spread=True)
@@ -128,30 +128,30 @@ def spread(walls, seen, pose, sigma=1.0):
     return scatter(Pyramid.of(grid, 0, 1.5), seen, pose, distance=1.5, angle=0.25, sigma=sigma)
 
 
-def test_scatter_knows_what_a_wall_does_not_say():
+def test_scatter_is_large_along_a_wall():
     along = np.arange(-4, 4, 0.04)
     wall = np.stack([along, np.full_like(along, 1.02)], axis=-1)
     part = wall[np.abs(along) < 1.5]
     corner = np.concatenate([part, part[:, ::-1] + [-2.0, 0]])
     alone = spread(wall, part, np.array([0, 0, 0.0]))
     turned = spread(wall, part, np.array([0, 0, np.pi / 2]))
-    assert alone[0, 0] > 1.5**2  # all of the window fits alike along the wall
+    assert alone[0, 0] > 1.5**2  # all poses along the wall fit equally
     assert alone[1, 1] < 0.05**2 and alone[2, 2] < 0.05**2
     np.testing.assert_allclose(turned[[0, 1], [0, 1]], alone[[1, 0], [1, 0]], rtol=1e-6)  # in the scan's frame
     both = spread(np.concatenate([wall, wall[:, ::-1] + [-2.0, 0]]), corner, np.array([0, 0, 0.0]))
     assert np.sqrt(both[[0, 1, 2], [0, 1, 2]]).max() < 0.05
 
 
-def test_scatter_sees_a_second_place_that_fits_as_well():
-    post = np.stack(np.meshgrid(0.025 + 0.05 * np.arange(5), 1.025 + 0.05 * np.arange(5)), axis=-1).reshape(-1, 2)
-    walls = np.concatenate([post, post + [0.9, 0]])
-    one, two = spread(post, post, np.zeros(3), sigma=0.3), spread(walls, post, np.zeros(3), sigma=0.3)
+def test_scatter_includes_a_second_mode():
+    pillar = np.stack(np.meshgrid(0.025 + 0.05 * np.arange(5), 1.025 + 0.05 * np.arange(5)), axis=-1).reshape(-1, 2)
+    walls = np.concatenate([pillar, pillar + [0.9, 0]])
+    one, two = spread(pillar, pillar, np.zeros(3), sigma=0.3), spread(walls, pillar, np.zeros(3), sigma=0.3)
     assert one[0, 0] < 0.1**2
-    # Half of the weight lies 0.9 m away, and the moment is taken about the pose that was found.
+    # Half of the weight is 0.9 m away, and the moment is taken about the matched pose.
     assert 0.55 < np.sqrt(two[0, 0]) < 1.0
 
 
-def test_finished_grids_match_as_others_do():
+def test_matching_with_quantised_grids():
     truth = np.array([1.83, 1.47, 0.12])
     points = thin(hits(truth), 0.05)
     small = GRID.quantised()
@@ -161,7 +161,7 @@ def test_finished_grids_match_as_others_do():
     assert fine.score == pytest.approx(coarse.score, abs=5e-3)
 
 
-def test_search_says_no_where_nothing_fits():
+def test_search_without_a_match():
     elsewhere = hits(np.array([0.0, 0.0, 0.3]), box(-1.3, -0.8, 1.1, 1.0))
     pyramid = Pyramid.of(GRID, 5, 2.0)
     assert search(pyramid, elsewhere, POSES[3], distance=2.0, angle=0.3, min_score=0.6) is None

@@ -1,4 +1,4 @@
-"""Odometry as a function of time, and covariance of its motions against sampling."""
+"""Odometry as a function of time, and covariance of its motions compared with sampling."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_covariance_of_a_motion_is_that_of_sampled_steps():
     np.testing.assert_allclose(half, covariance / 2, atol=2e-8)
 
 
-def test_an_error_of_scale_comes_on_top():
+def test_the_scale_error_is_added():
     odometry = Odometry(OdometryConfig(scale=0.02))
     odometry.add(0.0, np.zeros(3), np.zeros((3, 3)))
     odometry.add(1.0, np.array([3.0, 4.0, 0.5]), np.eye(3) * 1e-6)
@@ -50,7 +50,7 @@ def test_an_error_of_scale_comes_on_top():
     np.testing.assert_allclose(covariance.diagonal(), [0.1**2, 0.1**2, 1e-6], rtol=0.02)
 
 
-def test_drift_between_nodes_is_that_of_sampled_walks():
+def test_drift_between_nodes_agrees_with_sampled_walks():
     rng = np.random.default_rng(9)
     sigma = np.array([0.02, 0.01, 0.015])
     steps = np.tile([0.4, 0.05, 0.3], (30, 1))

@@ -1,13 +1,13 @@
-"""Headings from walls: the direction of a submap's walls, which one it is, and what SLAM makes of it."""
+"""Heading constraints from walls: the wall direction of a submap, its association, and the result of SLAM."""
 
 import numpy as np
 import pytest
 
 from radarize.io.pose import transform
-from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import associate_direction, from_right_angle
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig, WallsConfig
-from radarize.slam.walls import Direction, Walls
+from radarize.slam.walls import WallDirection, Walls
 from tests.slam.world import box, play, walk
 
 BEARINGS = np.radians(np.linspace(-60, 60, 61))
@@ -16,7 +16,7 @@ CORRIDOR = np.concatenate([box(0, 0, 40, 2), *(box(x, 0, x + 1, 0.15) for x in r
 
 
 def seen(walls, turn=0.0, noise=0.02, seed=0):
-    """Points on walls, seen from a frame that is turned."""
+    """Points on walls, in a frame that is rotated."""
     rng = np.random.default_rng(seed)
     a, b = walls[:, None, :2], walls[:, None, 2:]
     points = (a + (b - a) * rng.random((len(walls), 200, 1))).reshape(-1, 2)
@@ -24,7 +24,7 @@ def seen(walls, turn=0.0, noise=0.02, seed=0):
 
 
 def round_room(radius):
-    """Its walls."""
+    """Walls of a round room."""
     angles = np.linspace(0, 2 * np.pi, 33)
     corners = radius * np.column_stack([np.cos(angles), np.sin(angles)])
     return np.column_stack([corners[:-1], corners[1:]])
@@ -32,65 +32,68 @@ def round_room(radius):
 
 @pytest.mark.parametrize("degrees", [-44.9, -20.1, 0.0, 0.6, 33.3, 89.95])
 def test_walls_have_the_direction_of_the_room(degrees):
-    found = Direction.of(seen(box(-2, -1.5, 2.5, 1.5), np.radians(degrees)))
-    assert np.degrees(past_right_angle(found.angle + np.radians(degrees))) == pytest.approx(0, abs=0.1)
+    found = WallDirection.of(seen(box(-2, -1.5, 2.5, 1.5), np.radians(degrees)))
+    assert np.degrees(from_right_angle(found.angle + np.radians(degrees))) == pytest.approx(0, abs=0.1)
     assert found.contrast > 3
 
 
-def test_a_wall_across_the_cells_end_is_one_wall():
-    """Cells begin again after 51.2 m."""
-    near, far = (Direction.of(seen(box(x, 0, x + 3, 2), 0.3)) for x in (0, 50))
+def test_a_wall_across_the_end_of_the_bins_is_one_wall():
+    """The bins of a projection wrap around after 51.2 m."""
+    near, far = (WallDirection.of(seen(box(x, 0, x + 3, 2), 0.3)) for x in (0, 50))
     assert far.angle == pytest.approx(near.angle, abs=2e-3)
 
 
 def test_a_round_room_has_no_direction():
-    assert Direction.of(seen(round_room(2.0))).contrast < 1.3
+    assert WallDirection.of(seen(round_room(2.0))).contrast < 1.3
 
 
-def test_a_known_direction_a_new_one_and_one_in_doubt():
-    """With densities by hand: twenty walls 0.5 deg off, known to 1 deg; 20 deg off; between two of as many walls."""
+def test_a_known_a_new_and_an_ambiguous_direction():
+    """Compared with densities computed here: a deviation of 0.5 deg from a direction of twenty walls, with a standard
+    deviation of 1 deg; one of 20 deg; and one between two such directions."""
     deviation, walls = np.radians(1.0), [20, 20]
     density = 20 * np.exp(-(0.5**2) / 2) / np.sqrt(2 * np.pi) / deviation
     assert density / (density + 0.5 / (np.pi / 2)) > 0.9
-    assert recognised(np.radians([0.5, 20.0]), deviation**2, walls) == 0
-    assert recognised(np.radians([20.0, -20.0]), deviation**2, walls) == 2
-    assert recognised(np.radians([1.0, -1.2]), deviation**2, walls) is None
-    assert recognised(np.zeros(0), deviation**2, []) == 0
+    assert associate_direction(np.radians([0.5, 20.0]), deviation**2, walls) == 0
+    assert associate_direction(np.radians([20.0, -20.0]), deviation**2, walls) == 2
+    assert associate_direction(np.radians([1.0, -1.2]), deviation**2, walls) is None
+    assert associate_direction(np.zeros(0), deviation**2, []) == 0
 
 
-def test_a_submap_is_parallel_to_the_first_of_its_direction_alone():
-    """Of two wings at 30 degrees; what the first of each told of its direction is kept, and off by 1 degree."""
+def test_a_submap_is_parallel_to_the_first_one_of_its_direction():
+    """Two wings at 30 deg; the constraint refers to the first submap of each direction, whatever the errors of the
+    later headings."""
     walls, room = Walls(WallsConfig()), box(-2, -1.5, 2.5, 1.5)
     true, known = np.radians([0.0, 90.0, 30.0, 31.0, 0.0]), np.radians([0.0, 88.0, 30.0, 33.0, 3.0])
     wing = np.radians([0.0, 0.0, 30.0, 30.0, 0.0])
-    told = [
-        walls.meet(node, seen(room, true[node] - wing[node], seed=node), known, lambda a, b: np.radians(2.0) ** 2)
+    found = [
+        walls.associate(node, seen(room, true[node] - wing[node], seed=node), known, lambda a, b: np.radians(2.0) ** 2)
         for node in range(5)
     ]
-    assert told[0] is None and told[2] is None  # each is the first
+    assert found[0] is None and found[2] is None  # each is the first of its direction
     for node, first, turn in ((1, 0, 90.0), (3, 2, 1.0), (4, 0, 0.0)):
-        assert told[node][0] == first and np.degrees(told[node][1]) == pytest.approx(turn, abs=0.2)
+        assert found[node][0] == first and np.degrees(found[node][1]) == pytest.approx(turn, abs=0.2)
     walls.keep({1: 0, 3: 1, 4: 2})
-    told = walls.meet(3, seen(room, 0.0), np.radians([90.0, 31.0, 0.0, -2.0]), lambda a, b: np.radians(2.0) ** 2)
-    assert told[0] == 0 and np.degrees(told[1]) == pytest.approx(-90.0, abs=0.2)
+    found = walls.associate(3, seen(room, 0.0), np.radians([90.0, 31.0, 0.0, -2.0]), lambda a, b: np.radians(2.0) ** 2)
+    assert found[0] == 0 and np.degrees(found[1]) == pytest.approx(-90.0, abs=0.2)
 
 
-def test_after_a_turn_that_nobody_saw_directions_are_new():
-    """With 30 deg RMS lost, 40 deg off is nearly as likely as 50 deg off the next right angle."""
+def test_directions_are_new_after_an_unobserved_turn():
+    """With a standard deviation of 30 deg, a deviation of 40 deg is nearly as likely as 50 deg from the next right
+    angle."""
     walls, room = Walls(WallsConfig()), box(-2, -1.5, 2.5, 1.5)
     known = np.radians([0.0, 0.0, 40.0, 41.0])
 
     def lost(a, b):
         return np.radians(30.0 if a < 2 <= b else 1.0) ** 2
 
-    told = [walls.meet(node, seen(room, seed=node), known, lost) for node in range(4)]
-    assert told[0] is None and told[2] is None
+    found = [walls.associate(node, seen(room, seed=node), known, lost) for node in range(4)]
+    assert found[0] is None and found[2] is None
     for node, first in ((1, 0), (3, 2)):
-        assert told[node][0] == first and np.degrees(told[node][1]) == pytest.approx(0, abs=0.2)
+        assert found[node][0] == first and np.degrees(found[node][1]) == pytest.approx(0, abs=0.2)
 
 
 def heading_errors(enabled, seed):
-    """Of SLAM down the corridor, rad, where odometry's headings drift by 1 deg a metre."""
+    """Heading errors of SLAM down the corridor, rad, with a heading drift of odometry of 1 deg per metre."""
     poses, config = walk([[1, 1], [38, 1]], 0.05, 0.1), SlamConfig.preset("radar")
     slam = Slam(config.model_copy(update={"walls": config.walls.model_copy(update={"enabled": enabled})}))
     floor = np.array([0.001, 0.001, np.radians(0.25)])
@@ -101,7 +104,7 @@ def heading_errors(enabled, seed):
 
 
 def test_a_corridor_stays_straight():
-    """On five walks, where each of 740 steps is off by 0.25 deg RMS: by 1 deg and more within a submap already."""
+    """On five walks of 740 steps with an error of 0.25 deg RMS each, which is 1 deg and more within a submap."""
     errors = {
         enabled: np.degrees([np.abs(heading_errors(enabled, seed)).mean() for seed in range(5)])
         for enabled in (False, True)

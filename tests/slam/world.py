@@ -1,13 +1,13 @@
-"""A synthetic planar world of walls, scanned by exact ray casting; and a graph of poses on a lap of known truth."""
+"""A synthetic planar world of walls with exact ray casting; and a pose graph of a lap with known truth."""
 
 import numpy as np
 
 from radarize.io.pose import between, compose
 from radarize.slam.posegraph import PoseGraph
 
-#: Hz, and rad: of a radar's scans.
+#: Rate (Hz) and bearings (rad) of scans of a radar.
 RATE, BEARINGS = 30.0, np.radians(np.linspace(-44, 43, 88))
-#: Of a step of a lap, m and rad.
+#: Standard deviations of a step of a lap, m and rad.
 SIGMA = np.array([0.02, 0.02, 0.01])
 
 
@@ -17,7 +17,7 @@ def box(x0, y0, x1, y1):
 
 
 def ring():
-    """A square corridor with niches and columns that break its symmetry, 12 m outside, 3 m wide."""
+    """A square corridor with niches and columns that break its symmetry: outer side 12 m, width 3 m."""
     return np.concatenate(
         [
             box(0, 0, 12, 12),
@@ -65,7 +65,8 @@ def walk(corners, step, turn):
 
 
 def play(slam, walls, poses, rng, share=0.03, floor=1e-5, bearings=BEARINGS):
-    """Scans of 4.3 m along poses, and odometry whose steps are off by a share and a floor (m, rad); its last pose."""
+    """Add scans of 4.3 m along poses, and odometry whose steps have errors of a share plus a floor (m, rad); returns
+    its last pose."""
     odometry = poses[0]
     for k, (before, pose) in enumerate(zip(poses[[0, *range(len(poses) - 1)]], poses, strict=True)):
         step = between(before, pose)
@@ -77,7 +78,7 @@ def play(slam, walls, poses, rng, share=0.03, floor=1e-5, bearings=BEARINGS):
 
 
 def align(truth, estimate):
-    """Rotation (2, 2) and shift that carry estimated positions best onto true ones."""
+    """Rotation (2, 2) and shift of the best rigid alignment of estimated with true positions."""
     p, q = truth[:, :2], estimate[:, :2]
     u, _, vt = np.linalg.svd((p - p.mean(0)).T @ (q - q.mean(0)))
     turn = u @ np.diag([1, np.linalg.det(u @ vt)]) @ vt
@@ -85,13 +86,14 @@ def align(truth, estimate):
 
 
 def ate(truth, estimate):
-    """Mean distance after the best rigid alignment, m."""
+    """Absolute trajectory error: mean distance after the best rigid alignment, m."""
     turn, shift = align(truth, estimate)
     return float(np.hypot(*(estimate[:, :2] @ turn.T + shift - truth[:, :2]).T).mean())
 
 
 def lap(false, seed=7):
-    """201 nodes on two laps of a square of 25 m sides, noisy odometry, ten true and some false closures."""
+    """A pose graph with 201 nodes on two laps of a square with sides of 25 m: noisy odometry, ten true and some false
+    closures."""
     rng = np.random.default_rng(seed)
     truth = [np.zeros(3)]
     for k in range(200):

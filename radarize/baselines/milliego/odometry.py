@@ -9,7 +9,7 @@ from radarize.baselines.milliego.panorama import panoramas
 from radarize.io.pose import compose
 from radarize.io.stopwatch import stage
 from radarize.learning.features.windows import spaced
-from radarize.odometry.displacements import joined
+from radarize.odometry.displacements import as_track
 from radarize.odometry.integration import Track, intervals
 from radarize.odometry.smoother import FixedLagSmoother
 from radarize.pipeline.method import Inputs, Method
@@ -55,14 +55,14 @@ class MilliEgoOdometry(InertialOdometry):
                 self._next(time, dt, mean[0].double().numpy(), covariance[0].double().numpy())
                 for time, dt, (mean, covariance) in zip(centers, steps, found, strict=True)
             ]
-        return joined(centers, track)
+        return as_track(centers, track)
 
     def _next(self, time: float, dt: float, motion: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, ...]:
-        back = self.path.arrive(time)
+        back = self.path.add_frame(time)
         self._yaw.predict(dt)
         self._yaw.add_relative_motion(back, motion[2], self.path.reach * covariance[2, 2])
         older = compose(np.array([0, 0, self._yaw.values[-1 - back]]), np.array([*motion[:2], 0]))
-        return self.path.next(dt, back, older[:2], covariance, self._yaw.values[-1], self._yaw.since(1))
+        return self.path.update(dt, back, older[:2], covariance, self._yaw.values[-1], self._yaw.variance_since(1))
 
 
 METHOD = Method("milliEgo", MilliEgoOdometry, ("milliego",))

@@ -40,7 +40,7 @@ class RadarHdScans:
         with stage("scans"):
             likely = adaptive_max_pool2d(self.picture(batch), (len(self._ranges), len(BEARINGS))).numpy()
             bins = echoes.first(likely > float(self._net.least), likely)
-        return echoes.at(bins, self._ranges)
+        return echoes.bins_to_ranges(bins, self._ranges)
 
 
 def scans(inputs: Inputs) -> RadarHdScans:

@@ -7,7 +7,7 @@ from radarize.baselines.inertial import InertialOdometry
 from radarize.baselines.rnin.network import LASTS, SAMPLES, RninNet
 from radarize.io.pose import wrap
 from radarize.io.stopwatch import stage
-from radarize.odometry.displacements import joined
+from radarize.odometry.displacements import as_track
 from radarize.odometry.integration import Track, intervals
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
@@ -33,10 +33,10 @@ class RninOdometry(InertialOdometry):
         with stage("translation"):
             yaw = wrap(self.imu.yaw(centers))
             track = [
-                self.path.next(dt, self.path.arrive(center), *self._displacement(center), heading, _DRIFT**2 * dt)
+                self.path.update(dt, self.path.add_frame(center), *self._displacement(center), heading, _DRIFT**2 * dt)
                 for dt, center, heading in zip(steps, centers, yaw, strict=True)
             ]
-        return joined(centers, track, turn_seen=True)
+        return as_track(centers, track, turn_seen=True)
 
     def _displacement(self, instant: float) -> tuple[np.ndarray, np.ndarray]:
         """Displacement in the last window, and its covariance, from as many windows as there are by now."""

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from radarize.io.pose import between, compose, exponential, transform
 from radarize.io.stopwatch import stage
 from radarize.odometry.integration import Track, intervals
-from radarize.odometry.smoother import wandered
+from radarize.odometry.smoother import random_walk_covariance
 from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.method import Inputs, Method
 from radarize.signal.batch import Batch
@@ -82,7 +82,7 @@ class ScanMatching:
             return seen
         self._pose = compose(self._pose, exponential(self._rate[:2] * dt, self._rate[2] * dt))
         move = np.eye(6) + dt * np.eye(6, k=3)
-        self._spread = move @ self._spread @ move.T + np.kron(wandered(1.0, dt), np.diag(_WANDER**2))
+        self._spread = move @ self._spread @ move.T + np.kron(random_walk_covariance(1.0, dt), np.diag(_WANDER**2))
         if np.isfinite(turning).all():
             self._turn(*turning)
         if seen:

@@ -10,13 +10,12 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import cast
 
 from radarize.io.errors import InputError
 from radarize.io.hdf5 import open_hdf5
 from radarize.io.importers import import_recording
 from radarize.io.replacing import write_whole
-from radarize.io.yamlfile import read_yaml
+from radarize.io.yamlfile import read_beside
 
 PLATFORMS = {"walk": "handheld", "cart": "cart", "bot": "robot"}
 #: The paper's buildings by the archive's words.
@@ -92,7 +91,7 @@ def splits(names: list[str]) -> dict[str, Members]:
     Args:
         names: of the recordings; those that the artefact does not list are in no random split.
     """
-    listed = cast(dict[str, str], read_yaml(Path(__file__).with_name("archive.yaml")))
+    listed = read_beside(__file__)
     words = {name: name.split("_") for name in names}
     found = {
         f"random-{k}": {part: [n for n in names if listed.get(n, "-----")[k] == code] for code, part in _PARTS.items()}

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from plotly.subplots import make_subplots
 
 from radarize.evaluation.report.page import COLORS, INK
-from radarize.odometry.blindness import Span
+from radarize.odometry.observability import Span
 
 
 def panels(*labels: str, x: str = "time, s") -> go.Figure:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from radarize.evaluation.figures import Figure
-from radarize.odometry.blindness import BlindSpans
+from radarize.odometry.observability import UnobservableSpans
 from radarize.pipeline.health import Condition
 
 _TRAJECTORY = (
@@ -89,7 +89,7 @@ def everything(metrics: Mapping[str, object]) -> Iterator[PrintedTable | str]:
     yield PrintedTable(head[:-1], [row[:-1] for row in rows], numbers)
     yield from parts(metrics)
     if "blind" in metrics:
-        sentence, spans = blindness(BlindSpans.model_validate(metrics["blind"]))
+        sentence, spans = blindness(UnobservableSpans.model_validate(metrics["blind"]))
         yield sentence
         if spans.rows:
             yield spans
@@ -108,7 +108,7 @@ def health(found: Sequence[Condition]) -> PrintedTable:
     return PrintedTable(("from, s", "to, s", "what", "advice"), rows, (0, 1))
 
 
-def blindness(found: BlindSpans) -> tuple[str, PrintedTable]:
+def blindness(found: UnobservableSpans) -> tuple[str, PrintedTable]:
     """A sentence on how much of the way odometry was blind, and where it was."""
     rows = [(f"{s.start_s:.1f}", f"{s.stop_s:.1f}", f"{s.way_m:.2f}", s.why) for s in found.spans]
     over = f"(no match believed, no velocity) over {found.way_m:.1f} m, {100 * found.share_of_way:.0f} % of the way"

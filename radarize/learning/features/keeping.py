@@ -12,7 +12,7 @@ _BATCH = 32
 
 
 def keep_maps(source: Path, output: Path) -> Path:
-    """Turn a recording, simulated or real, into one with maps instead of samples, about a tenth of the size.
+    """Turn a recording, simulated or real, into one with maps instead of samples, about 37 % of the size.
 
     Truth and other streams are kept, except I/Q by cause.
 

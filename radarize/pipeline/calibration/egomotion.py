@@ -122,7 +122,7 @@ def _initial(cells: Cells, waves: Waves, config: RadarConfig, frames: int) -> Eg
         if len(group) < _FEWEST:
             continue
         columns = cells.range[group], cells.speed[group], *waves.directions[group].T
-        echoes = np.column_stack([*columns, np.full(len(group), 0.003), 10 * cells.power[group]])
+        echoes = np.column_stack([*columns, np.full(len(group), 0.003), 10 * cells.power[group], waves.purity[group]])
         found, covariance, inliers = estimator.solve(echoes)
         number = cells.frame[group[0]]
         velocity[number, :2] = found

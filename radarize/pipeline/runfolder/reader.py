@@ -20,7 +20,7 @@ from radarize.io.jsonfile import read_json
 from radarize.io.plain import complaint
 from radarize.io.replacing import write_whole
 from radarize.io.tum import read_tum
-from radarize.odometry.blindness import BlindSpans
+from radarize.odometry.observability import UnobservableSpans
 from radarize.odometry.uncertainty import ErrorModel
 from radarize.pipeline.health import Condition
 from radarize.pipeline.runfolder.occupancy import OccupancyMap
@@ -114,7 +114,7 @@ class RunFolder:
         return [str(words) for words in found]
 
     @property
-    def blind(self) -> BlindSpans | None:
+    def blind(self) -> UnobservableSpans | None:
         """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
 
         Raises:
@@ -123,7 +123,7 @@ class RunFolder:
         if "blind" not in self.facts:
             return None
         try:
-            found = BlindSpans.model_validate(self.facts["blind"])
+            found = UnobservableSpans.model_validate(self.facts["blind"])
         except ValidationError as error:
             raise InputError(f"{self.path / 'run.json'}: blind.{complaint(error)}") from error
         start = float(self.trajectory[0][0])

@@ -307,11 +307,11 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
 
 
 def test_the_how_tos_method_runs(rooms, tmp_path, monkeypatch):
-    text = (Path(__file__).parents[3] / "docs" / "comparing.md").read_text()
+    text = (Path(__file__).parents[3] / "docs" / "howto" / "method.md").read_text()
     code = next(block for block in re.findall("```python\n(.*?)```", text, re.S) if "class Wall" in block)
     monkeypatch.setitem(SCANS, "wall", SCANS["cfar"])  # so that it is taken out again
     code = code.replace('"small"', repr(str(rooms))).replace('"tables"', repr(str(tmp_path)))
-    exec(compile(code, "comparing.md", "exec"), {})
+    exec(compile(code, "method.md", "exec"), {})
     rows = json.loads((tmp_path / "mapping.json").read_text())["tables"][0]["rows"][-2:]
     assert [row["scans"] for row in rows] == ["wall", "threshold"] and rows[0]["returned %"] == pytest.approx(100)
 

@@ -280,7 +280,7 @@ def test_an_imu_is_read_on_the_radars_axes(tmp_path):
                 found = Imu.of(recording).samples
                 assert found == pytest.approx(np.tile([*force, *turn], (len(found), 1)), abs=1e-5)
             else:
-                with pytest.raises(InputError, match=r"no /imu/mount, and gravity is felt along \[0.2, -9.8, 0.3\]"):
+                with pytest.raises(InputError, match=r"no /imu/mount, and mean specific force is \[0.2, -9.8, 0.3\]"):
                     Imu.of(recording)
         (tmp_path / "a.bag").unlink()
     with pytest.raises(InputError, match="is no ROS bag, but imu_turn is"):

@@ -16,7 +16,7 @@ from radarize.learning.training.dataset import DEFAULT, FrameDataset
 from radarize.signal.maps import MAPS, STEP
 from tests.learning.training.walks import CONFIG, TURN, VELOCITY, walk
 
-HOW_TO = Path(__file__).parents[3] / "docs" / "learning.md"
+HOW_TO = Path(__file__).parents[3] / "docs" / "howto" / "train.md"
 
 
 @pytest.fixture(scope="module")

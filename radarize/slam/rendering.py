@@ -1,4 +1,4 @@
-"""The map of a session that goes on: what is new is added, and all is drawn anew where poses have moved."""
+"""Map of a running session: new nodes are added, and the map is rendered again where poses have changed."""
 
 import time
 from collections.abc import Sequence
@@ -12,12 +12,12 @@ from radarize.slam.grid import OccupancyGrid
 from radarize.slam.node import Node
 
 
-class Drawing:
-    """Occupancy grid of nodes at their poses.
+class MapRenderer:
+    """Renders the occupancy grid of nodes at their poses.
 
     Args:
-        config: of rays; its `map_resolution` is the size of a cell.
-        pause: s to sleep after every node, so that a thread that draws leaves the interpreter to others.
+        config: evidence of rays; `map_resolution` is the cell size.
+        pause: s to sleep after every node, so that a rendering thread releases the interpreter.
     """
 
     def __init__(self, config: GridConfig, pause: float = 0.0):
@@ -26,16 +26,17 @@ class Drawing:
 
     def _clear(self) -> None:
         self._grid, self._nodes = OccupancyGrid.empty(self.config.map_resolution), []
-        self._poses, self._reach = np.zeros((0, 3)), 0.0  # m, of the longest ray
+        self._poses, self._reach = np.zeros((0, 3)), 0.0  # length of the longest ray, m
 
-    def of(self, nodes: Sequence[Node], poses: Float[np.ndarray, "node 3"]) -> OccupancyGrid:
-        """Map of all nodes; those drawn before stay as they are if no end of a ray has moved by more than a cell."""
+    def render(self, nodes: Sequence[Node], poses: Float[np.ndarray, "node 3"]) -> OccupancyGrid:
+        """Return the map of all nodes. It is only extended if no end of a previous ray has moved by more than a
+        cell."""
         count, cell = len(self._nodes), self.config.map_resolution
-        known = count <= len(nodes) and all(a is b for a, b in zip(self._nodes, nodes, strict=False))
-        if known:
+        unchanged = count <= len(nodes) and all(a is b for a, b in zip(self._nodes, nodes, strict=False))
+        if unchanged:
             moved = np.abs(between(self._poses, poses[:count]))
-            known = bool((np.hypot(moved[:, 0], moved[:, 1]) + self._reach * moved[:, 2] < cell).all())
-        if not known:
+            unchanged = bool((np.hypot(moved[:, 0], moved[:, 1]) + self._reach * moved[:, 2] < cell).all())
+        if not unchanged:
             self._clear()
         for node, pose in zip(nodes[len(self._nodes) :], poses[len(self._nodes) :], strict=True):
             origins, ends, hits = node.rays

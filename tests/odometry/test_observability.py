@@ -1,17 +1,17 @@
-"""Spans over which odometry was blind, of tracks made by hand."""
+"""Spans in which motion is unobservable, of synthetic tracks."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from radarize.odometry.blindness import Blindness
+from radarize.odometry.observability import Observability
 
 PERIOD = 0.05
 
 
 def track(count, start=0.0, no_velocity=(), no_turn=()):
-    """A walk of 1 m/s forwards."""
+    """A walk at 1 m/s forwards."""
     frames = np.arange(count)
     step = np.zeros((count, 3))
     step[1:, 0] = PERIOD
@@ -24,13 +24,13 @@ def track(count, start=0.0, no_velocity=(), no_turn=()):
 
 
 def found(*tracks, period=PERIOD):
-    blind = Blindness(period)
+    observability = Observability(period)
     for each in tracks:
-        blind.add(each)
-    return blind
+        observability.add(each)
+    return observability
 
 
-def test_a_span_goes_from_the_last_good_frame_to_the_last_bad_one():
+def test_a_span_is_from_the_last_observed_frame_to_the_last_unobserved_one():
     summary = found(track(200, start=100, no_velocity=range(40, 60))).found.model_dump()
     (span,) = summary["spans"]
     assert span["why"] == "no velocity"
@@ -39,16 +39,16 @@ def test_a_span_goes_from_the_last_good_frame_to_the_last_bad_one():
     assert summary["share_of_way"] == pytest.approx(20 / 199, abs=1e-4)
 
 
-def test_blinks_vanish_and_neighbours_join():
-    blinks = [*range(10, 15), *range(30, 35)]  # 0.25 s each, 0.8 s apart
-    assert found(track(200, no_velocity=blinks)).found.model_dump() == {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
-    assert found(track(200, no_velocity=blinks)).warnings() == []
+def test_short_spans_are_left_out_and_neighbours_joined():
+    short = [*range(10, 15), *range(30, 35)]  # 0.25 s each, 0.8 s apart
+    assert found(track(200, no_velocity=short)).found.model_dump() == {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
+    assert found(track(200, no_velocity=short)).warnings() == []
     (span,) = found(track(200, no_velocity=range(10, 15), no_turn=range(19, 24))).found.spans
     assert span.why == "no velocity and no turn"
-    assert span.way_m == pytest.approx(10 * PERIOD)  # sight between them is not blind
+    assert span.way_m == pytest.approx(10 * PERIOD)  # without the observed frames between them
 
 
-def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
+def test_lost_frames_are_a_span_and_skipped_frames_are_not():
     whole = track(40)
     rows = np.r_[0:10, 25:40]
     gap = SimpleNamespace(**{name: values[rows] for name, values in vars(whole).items()})
@@ -68,7 +68,7 @@ def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
 
 def test_batches_do_not_matter():
     whole = track(120, no_velocity=range(7, 31), no_turn=range(28, 90))
-    parts = Blindness(PERIOD)
+    parts = Observability(PERIOD)
     for k in range(0, 120, 7):
         part = SimpleNamespace(**{name: values[k : k + 7] for name, values in vars(whole).items()})
         parts.add(part)
@@ -76,8 +76,8 @@ def test_batches_do_not_matter():
 
 
 def test_the_warning_counts_from_the_first_frame():
-    blind = found(track(200, start=1.7e9, no_velocity=range(100, 130), no_turn=range(20, 28)))
-    assert blind.warnings() == [
-        "odometry was blind 2 times, for 1.9 s and 19 % of the way; at the longest from 5.0 to 6.5 s (no velocity); "
-        "poses there are guessed"
+    observability = found(track(200, start=1.7e9, no_velocity=range(100, 130), no_turn=range(20, 28)))
+    assert observability.warnings() == [
+        "heading or velocity was unobservable in 2 spans, for 1.9 s and 19 % of the path, in the longest from 5.0 to "
+        "6.5 s (no velocity); poses there are predictions"
     ]

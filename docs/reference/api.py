@@ -11,9 +11,9 @@ from docs.reference.markdown import code, docstring, plain, table
 _HEAD = """# Python API
 
 For your own programs. The annotations give the shapes of arrays; units are SI. Input that cannot be used raises
-`radarize.InputError`. [In Python](../howto/python.md) introduces the functions. Examples take `import radarize as rz` and
-an opened recording, `rec`. Of a member's arguments, those in brackets are optional. `radarize.odometry` is another name
-of `radarize.estimate_odometry`.
+`radarize.InputError`. [In Python](../howto/python.md) introduces the functions. Examples take `import radarize as rz`
+and an opened recording, `rec`. Of a member's arguments, those in brackets are optional. `radarize.odometry` is another
+name of `radarize.estimate_odometry`.
 """
 #: Beyond the names of `radarize` and `radarsim`: sections of names by where they are defined.
 _SECTIONS = {

@@ -85,7 +85,7 @@ def run(
         theirs, ended = used(board.process) - before, os.times()
     wall = ended.elapsed - begun.elapsed
     ours = ended.children_user + ended.children_system - begun.children_user - begun.children_system
-    late = re.findall(r"(\d+) of them late, ([\d.]+) s", board.said)
+    late = re.findall(r"(\d+) of them late, ([\d.]+) s", board.output)
     arriving = chirps_that_arrive(config, frames, Disturbance(**shares, rng=np.random.default_rng(seed)))
     losses, mismarked, wrong, warnings = compared(folder / "captured.h5", played, arriving)
     row = {

@@ -393,7 +393,7 @@ FAULTS: dict[str, Fault] = {
     "receiver copied": Fault("receiver copied", receiver_copied),
     "receiver saturated": Fault("receiver saturated", receiver_saturated),
     "transmitter dead": Fault("transmitter dead", transmitter_dead),
-    "all channels alike": Fault("channels alike", alike),
+    "all channels identical": Fault("channels identical", alike),
     "I alone": Fault("I without Q", i_alone),
     "I twice": Fault("I without Q", i_twice),
     "samples times 4": Fault("samples scaled", multiplied),

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.radar.noise import noise_floor, noise_profile
-from radarsim.motion.pedestrians import crowded
+from radarsim.motion.pedestrians import with_pedestrians
 from radarsim.motion.trajectory import Motion
 from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
@@ -210,7 +210,7 @@ def corridor(scenario: Scenario) -> Scenario:
 
 def crowd(scenario: Scenario) -> Scenario:
     """Five people walk about, 0.6 m away and more."""
-    return replace(scenario, scene=crowded(scenario.scene, scenario.motion, 5, scenario.seed))
+    return replace(scenario, scene=with_pedestrians(scenario.scene, scenario.motion, 5, scenario.seed))
 
 
 def mounted(height: float = 1.2, pitch: float = 0.0, roll: float = 0.0) -> Callable[[Scenario], Scenario]:

@@ -89,7 +89,7 @@ def main(options: argparse.Namespace) -> Page:
         }
         for way, how in ways.items():
             folder = Path(name) / way
-            _, took = timed(lambda folder=folder, how=how: make(specification, folder, say=lambda line: None, **how))
+            _, took = timed(lambda folder=folder, how=how: make(specification, folder, log=lambda line: None, **how))
             found[way] = digests(folder)
             workers = 1 if way == "one process" else cores if way.endswith("processes") else NODES
             first = rows[0]["s"] if rows else took

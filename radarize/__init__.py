@@ -7,7 +7,7 @@
     run = rz.run(rec)
     print(rz.evaluate(run))
 
-What stands here is loaded at its first use. ``docs/howto/python.md`` shows it.
+Names are imported at first use. ``docs/howto/python.md`` shows what they do.
 """
 
 from importlib import import_module
@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from radarize.pipeline.run import Run as Run
     from radarize.pipeline.run import run as run
 
-#: Of both packages: pyproject.toml takes it from here.
+#: Version of both packages; pyproject.toml reads it.
 __version__ = "1.1.0.dev0"
 
-#: The face: where each name stands.
+#: Module of each public name.
 _HOMES = {
     "InputError": "io.errors",
     "Recording": "io.recording",

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from radarsim.machine.kernels import drop_stale
 
-# Compiled loops last a millisecond or less. OpenMP's threads would spin between them, for milliseconds, on the cores
-# that Mitsuba's threads and whatever else runs need: that doubled the time of a frame. Read when the library loads.
+# Numba's compiled loops last a millisecond or less. OpenMP threads that spin between them occupy the cores that Mitsuba
+# and other processes need, which doubles the time of a frame. The variable is read when the library loads.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-# Open3D brings an old TBB along, of which Numba complains before it takes the next: it need not look there first.
+# Open3D ships an old TBB, which Numba warns about before it takes another thread layer: exclude TBB from its search.
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
 
 drop_stale(Path(__file__).parent)
@@ -27,7 +27,7 @@ __all__ = ["simulate"]
 
 
 def __getattr__(name: str) -> object:
-    """`simulate`, loaded at its first use."""
+    """`simulate`, imported on first use."""
     if name not in __all__:
         raise AttributeError(f"module 'radarsim' has no attribute {name!r}")
     from radarsim.api import simulate

@@ -1,4 +1,4 @@
-"""What `import radarsim` offers, and `radarsim simulate` calls."""
+"""Python interface of the simulator: `radarsim.simulate`, which the command `radarsim simulate` calls too."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ from radarsim.world.scene import Scene
 
 
 class Plan(TypedDict, total=False):
-    """What is simulated; the options of ``radarsim simulate``, with the defaults of `planned` and `Walk`."""
+    """Options of a simulation: those of ``radarsim simulate``, with the defaults of `planned` and `Walk`."""
 
     platform: Literal["handheld", "cart", "robot"]
     trajectory: Path | None
@@ -39,15 +39,15 @@ def simulate(
     progress: Callable[[int, int], None] | None = None,
     **plan: Unpack[Plan],
 ) -> Recording:
-    """Simulate a walk through a scene.
+    """Simulate the recording of a radar that moves through a scene.
 
     Args:
-        scene: name of one that comes with the project (``"office"``, ``"stress/corner@2"``), a YAML file, or a `Scene`.
-        output: recording to write (``.h5``); by default a temporary file that goes with the object.
-        workers: processes that make frames; 1: this one; None: one per core, as the command does. A script that asks
-            for more than 1 needs an ``if __name__ == "__main__"``.
-        progress: called with (frames done, frames in all).
-        plan: ``platform`` (``"handheld"``, ``"cart"``, ``"robot"``) of a planned tour, or a ``trajectory`` (TUM) or
+        scene: name of a scene of the project (``"office"``, ``"stress/corner@2"``), a YAML file, or a `Scene`.
+        output: recording to write (``.h5``); by default a temporary file that is deleted with the object.
+        workers: number of processes that compute frames; 1: this process only; None: one per core, as in the command. A
+            script that uses more than 1 needs an ``if __name__ == "__main__"``.
+        progress: called with (frames done, total frames).
+        plan: ``platform`` (``"handheld"``, ``"cart"``, ``"robot"``) on a planned tour, or a ``trajectory`` (TUM) or
             ``waypoints`` (m) to follow; ``mounting`` of the sensor (x y z in m, roll pitch yaw in degrees);
             ``duration`` (s; 40 of a tour); ``people`` near the path; ``seed`` (same seed, same bytes); ``radar`` (a
             preset, ``.cfg`` or `RadarConfig`); ``frontend`` (YAML); ``sensors`` beside the radar, as ``"depth,imu"``.

@@ -1,4 +1,4 @@
-"""`radarsim`: the simulator's command line. Heavy modules load inside the commands, so that --help is instant."""
+"""Command line of the simulator, `radarsim`. Heavy modules are imported inside the commands, so that --help is fast."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,11 +10,11 @@ from radarize.io.errors import InputError
 from radarize.io.plugins import Plugins
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
-scene_app = typer.Typer(help="Look at a scene without simulating it.", no_args_is_help=True)
+scene_app = typer.Typer(help="Show, import and export scenes.", no_args_is_help=True)
 app.add_typer(scene_app, name="scene")
 
 SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A scene of this project (office, stress/corner@2) or a file.")
+    str, typer.Argument(metavar="SCENE", help="Scene: a name (office, stress/corner@2) or a YAML file.")
 ]
 
 
@@ -31,33 +31,33 @@ def _print_warnings(attributes: dict[str, object]) -> None:
 def simulate(
     scene: SceneName,
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
-    platform: Annotated[Literal["handheld", "cart", "robot"], typer.Option(help="How the sensor moves.")] = "handheld",
-    trajectory: Annotated[Path | None, typer.Option(help="Poses (TUM) to follow instead of a platform's.")] = None,
+    platform: Annotated[Literal["handheld", "cart", "robot"], typer.Option(help="Carrier of the sensor.")] = "handheld",
+    trajectory: Annotated[Path | None, typer.Option(help="Poses (TUM) to follow instead of a tour.")] = None,
     waypoints: Annotated[
-        Path | None, typer.Option(help="Places x y (YAML, CSV or TUM) to go through instead of a tour.")
+        Path | None, typer.Option(help="Way-points x y in m instead of a tour (YAML, CSV, TUM).")
     ] = None,
-    mounting: Annotated[str, _pose("Sensor on its carrier, m and degrees.")] = "",
+    mounting: Annotated[str, _pose("Mounting of the sensor on its platform, m and degrees.")] = "",
     duration: Annotated[
-        float | None, typer.Option(min=0.0, help="Length, s; else 40 of a tour, all of a trajectory or way-points.")
+        float | None, typer.Option(min=0.0, help="Duration, s; default: 40 s of a tour, or all of the given path.")
     ] = None,
-    people: Annotated[int, typer.Option(min=0, max=50, help="Pedestrians near the radar's path.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
-    radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
+    people: Annotated[int, typer.Option(min=0, max=50, help="Number of pedestrians near the radar's path.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same bytes.")] = 0,
+    radar: Annotated[str, typer.Option(help="Radar configuration: a .cfg file or a preset.")] = "radarize",
     frontend: Annotated[
-        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else the board's.")
+        Path | None, typer.Option(help="Front-end file (.yaml) of `calibrate`; default: the board's.")
     ] = None,
     sensors: Annotated[
         str,
         typer.Option(
-            help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts, or all; and "
-            "paths, every path above the noise; adc-by-cause, I/Q split by path type, before noise (much larger files)."
+            help="Sensors and truth to add, comma-separated: depth, occupancy, tracking, imu, points, ghosts, or all; "
+            "also paths (all paths above the noise) and adc-by-cause (noise-free I/Q by path type; much larger files)."
         ),
     ] = "",
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; by default one per core, fewer for short recordings.")
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core, fewer if short.")
     ] = None,
 ) -> None:
-    """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
+    """Simulate a walk through SCENE and write a recording with ground truth; an interrupted run is resumed."""
     plan: Any = {name: value for name, value in locals().items() if name not in ("scene", "output")}
     from radarize.io.recording import keeping
     from radarize.radar.cfg import remarks
@@ -76,15 +76,15 @@ def simulate(
 @app.command()
 def dataset(
     specification: Annotated[
-        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, stress, ...")
+        Path, typer.Argument(metavar="SPEC.yaml", help="Data set: a file, or small, training, evaluation, stress, ...")
     ],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the recordings.")] = None,
-    plan: Annotated[bool, typer.Option("--plan", help="Print what differs between the recordings, and stop.")] = False,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
-    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
-    replace: Annotated[bool, typer.Option("--replace", help="Make recordings of other parameters anew.")] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder for the recordings.")] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Print the parameters of each recording and stop.")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Number of processes; default: one per core.")] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Ray cluster; auto: on this machine.")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace recordings with other parameters.")] = False,
 ) -> None:
-    """Make the recordings of a data set. Started again, it goes on where it was stopped."""
+    """Simulate the recordings of a data set; an interrupted run is resumed."""
     from radarsim.dataset.plan import print_plan
     from radarsim.dataset.run import make
     from radarsim.dataset.specification import Specification
@@ -97,7 +97,7 @@ def dataset(
         raise InputError("--output is missing, expected a folder for the recordings, or --plan")
     with progress("frames") as report:
         outcome = make(wanted, output, workers=workers, ray=ray, replace=replace, progress=report)
-    print(f"{len(outcome.made)} recordings made, {len(outcome.kept)} were there; {output}")
+    print(f"{len(outcome.made)} recordings made, {len(outcome.kept)} already there; {output}")
     if outcome.failed:
         raise InputError(f"{len(outcome.failed)} recordings failed: {'; '.join(outcome.failed.values())}")
 
@@ -106,9 +106,9 @@ def dataset(
 def calibrate(
     recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, best at rest.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Front-end file to write (.yaml).")],
-    frames: Annotated[int, typer.Option(min=1, help="Frames to look at.")] = 8,
+    frames: Annotated[int, typer.Option(min=1, help="Number of frames to use.")] = 8,
 ) -> None:
-    """Fit the simulated front end to a real radar: noise, band edge, leakage, channels."""
+    """Fit the simulated front end to a real radar: noise, filter band edge, leakage, channel errors."""
     from radarsim.receiver.calibrate import calibrate
 
     with working(f"calibrating on {recording.name}"):
@@ -120,21 +120,21 @@ def calibrate(
 
 @app.command()
 def twin(
-    recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, with poses.")],
-    scene: Annotated[str, typer.Option(help="Model of the place: a scene of this project, or a .yaml file.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Twin to write (.h5), with .html and .json beside.")],
-    origin: Annotated[str, _pose("The poses' origin in the scene, m and degrees.")] = "",
-    mounting: Annotated[str, _pose("Radar on the body whose poses they are.")] = "",
-    at: Annotated[str, _pose("Place of a radar at rest, instead of poses.")] = "",
-    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else the board's own.")] = None,
+    recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar with poses.")],
+    scene: Annotated[str, typer.Option(help="Model of the place: a scene's name or YAML file.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5), with a report beside.")],
+    origin: Annotated[str, _pose("Origin of the poses in the scene, m and degrees.")] = "",
+    mounting: Annotated[str, _pose("Mounting of the radar on the body that the poses describe.")] = "",
+    at: Annotated[str, _pose("Pose of a radar at rest, if the recording has none.")] = "",
+    frontend: Annotated[Path | None, typer.Option(help="Front-end file (.yaml); default: the board's.")] = None,
     calibrate: Annotated[
-        bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
+        bool, typer.Option("--calibrate", help="Fit the front end to the recording first; also writes its .yaml.")
     ] = False,
     every: Annotated[int, typer.Option(min=1, help="Simulate every N-th frame.")] = 1,
-    duration: Annotated[float | None, typer.Option(min=0.0, help="Of the recording, s; else all of it.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
+    duration: Annotated[float | None, typer.Option(min=0.0, help="Duration, s; default: all of it.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of speckle and noise.")] = 0,
 ) -> None:
-    """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
+    """Simulate a real recording again in a model of its place, frame by frame, and compare the two."""
     from radarize.io.recording import Recording, keeping
     from radarsim.motion.trajectory import Mounting
     from radarsim.twin.report import report_twin
@@ -176,18 +176,18 @@ def info(scene: SceneName) -> None:
     settings = loaded.surface_settings
     print(f"clutter: {settings.clutter:g}, unevenness: {settings.unevenness:g}")
     if settings == IDEAL:
-        print("This scene is bare. `clutter: 1` and `unevenness: 1` in its file furnish it.")
+        print("This scene has no clutter; set `clutter: 1` and `unevenness: 1` in its file to add some.")
 
 
 @scene_app.command()
 def preview(
     scene: SceneName,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the pictures.")] = Path("."),
-    web: Annotated[bool, typer.Option("--web", help="A page instead: building, tour and echoes in 3-D.")] = False,
-    time: Annotated[float, typer.Option(min=0.0, help="Of the frame whose echoes the page draws, s.")] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of the page's tour.")] = 0,
+    web: Annotated[bool, typer.Option("--web", help="Write an interactive 3-D page instead.")] = False,
+    time: Annotated[float, typer.Option(min=0.0, help="Time of the frame whose paths the page shows, s.")] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the page's tour.")] = 0,
 ) -> None:
-    """Draw SCENE as pictures: its floor plan and a rendering with the ceilings taken off."""
+    """Draw SCENE: its floor plan, and a rendering without the ceilings."""
     from radarsim.world.scene import Scene
 
     if web:
@@ -208,9 +208,9 @@ def preview(
 @scene_app.command("export")
 def export_(
     scene: SceneName,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Mesh to write: .glb, .ply, .obj or .stl.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Mesh file to write: .glb, .ply, .obj or .stl.")],
 ) -> None:
-    """Write SCENE as a mesh, m, z up (glTF: y up)."""
+    """Export SCENE as a mesh in m, z up (glTF: y up)."""
     from radarsim.world.export import export_scene
     from radarsim.world.scene import Scene
 
@@ -230,20 +230,20 @@ def import_(
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Scene to write (.yaml), or a folder for it.")],
     materials: Annotated[
-        Path | None, typer.Option(help="YAML of 'pattern: material'; the first to match a part's name decides.")
+        Path | None, typer.Option(help="YAML of 'pattern: material'; the first match by part name applies.")
     ] = None,
     default: Annotated[
-        str | None, typer.Option(help="Of parts whose names say nothing; else plasterboard, of whole rooms concrete.")
+        str | None, typer.Option(help="Material of unmatched parts; default: plasterboard, concrete for rooms.")
     ] = None,
-    units: Annotated[str | None, typer.Option(help="m, cm, mm, in or ft; else m, if that is plausible.")] = None,
-    up: Annotated[str | None, typer.Option(help="y or z; else as a glTF or OBJ mesh looks, z of others.")] = None,
-    floor: Annotated[bool, typer.Option(help="Bring a mesh's floor to z = 0.")] = True,
+    units: Annotated[str | None, typer.Option(help="Unit: m, cm, mm, in or ft; default: m if plausible.")] = None,
+    up: Annotated[str | None, typer.Option(help="Up axis: y or z; default: estimated from the mesh.")] = None,
+    floor: Annotated[bool, typer.Option(help="Move the floor of a mesh to z = 0.")] = True,
     budget: Annotated[int, typer.Option(help="Decimate a mesh to this many triangles.")] = 300_000,
-    height: Annotated[float, typer.Option(help="Floor to ceiling of a map or log, m.")] = 2.7,
-    thickness: Annotated[float, typer.Option(help="Thinnest wall of a map or log, m.")] = 0.1,
-    resolution: Annotated[float, typer.Option(help="Cells of a log, m.")] = 0.05,
+    height: Annotated[float, typer.Option(help="Room height for a map or log, m.")] = 2.7,
+    thickness: Annotated[float, typer.Option(help="Minimum wall thickness for a map or log, m.")] = 0.1,
+    resolution: Annotated[float, typer.Option(help="Grid resolution for a log, m.")] = 0.05,
 ) -> None:
-    """Make a scene of a mesh, a Mitsuba scene, a ROS map or a lidar log."""
+    """Import a mesh, a Mitsuba scene, a ROS map or a lidar log as a scene."""
     from radarsim.world.importers import Options, import_scene
 
     with progress(f"import {source.stem}") as report:
@@ -279,26 +279,26 @@ def export(
 
 @app.command()
 def emulate(
-    source: Annotated[str, typer.Argument(metavar="SOURCE", help="A recording (.h5) to play, or a scene to simulate.")],
-    port_link: Annotated[Path | None, typer.Option(metavar="PATH", help="Name to give the serial port.")] = None,
-    host: Annotated[str, typer.Option(help="Address of the computer that records.")] = "127.0.0.1",
+    source: Annotated[str, typer.Argument(metavar="SOURCE", help="Recording (.h5) to play, or scene to simulate.")],
+    port_link: Annotated[Path | None, typer.Option(metavar="PATH", help="Symbolic link to the serial port.")] = None,
+    host: Annotated[str, typer.Option(help="Address of the capture computer.")] = "127.0.0.1",
     board: Annotated[str, typer.Option(help="Address of the virtual DCA1000.")] = "127.0.0.2",
-    command_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of requests and replies.")] = 4096,
-    data_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of samples.")] = 4098,
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, without end.")] = False,
-    loss: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of the packets to lose.")] = 0.0,
-    duplicate: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share to send twice.")] = 0.0,
-    reorder: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that 1-8 others overtake.")] = 0.0,
-    delay: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that 100-400 others overtake.")] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of what happens to packets, and of a scene's walk.")] = 0,
+    command_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port for requests and replies.")] = 4096,
+    data_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port for samples.")] = 4098,
+    loop: Annotated[bool, typer.Option("--loop", help="Repeat the recording or walk forever.")] = False,
+    loss: Annotated[float, typer.Option(min=0.0, max=1.0, help="Fraction of packets to drop.")] = 0.0,
+    duplicate: Annotated[float, typer.Option(min=0.0, max=1.0, help="Fraction of packets to duplicate.")] = 0.0,
+    reorder: Annotated[float, typer.Option(min=0.0, max=1.0, help="Fraction delayed by 1-8 packets.")] = 0.0,
+    delay: Annotated[float, typer.Option(min=0.0, max=1.0, help="Fraction delayed by 100-400 packets.")] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of packet faults and of a scene's tour.")] = 0,
     platform: Annotated[
-        Literal["handheld", "cart", "robot"], typer.Option(help="How it moves in a scene.")
+        Literal["handheld", "cart", "robot"], typer.Option(help="Platform that carries the sensor in a scene.")
     ] = "handheld",
-    duration: Annotated[float, typer.Option(min=0.0, help="Length of the walk through a scene, s.")] = 40.0,
-    radar: Annotated[str, typer.Option(help="Configuration to expect for a scene: a .cfg or a preset.")] = "radarize",
-    ahead: Annotated[float, typer.Option(min=0.0, help="How much to make ahead of time, s.")] = 10.0,
+    duration: Annotated[float, typer.Option(min=0.0, help="Duration of the tour through a scene, s.")] = 40.0,
+    radar: Annotated[str, typer.Option(help="Configuration expected for a scene: a .cfg or a preset.")] = "radarize",
+    ahead: Annotated[float, typer.Option(min=0.0, help="Time to simulate ahead of transmission, s.")] = 10.0,
 ) -> None:
-    """Be an IWR1843 with a DCA1000: a serial port and UDP on this machine, for any capture software."""
+    """Emulate an IWR1843 with a DCA1000 on this machine: a serial port and UDP, for any capture software."""
     import time
 
     import numpy as np
@@ -321,7 +321,7 @@ def emulate(
     console = Console(stderr=True)
     with Emulator(
         given, addresses=Addresses(board, host, command_port, data_port), port_link=port_link,
-        disturbance=disturbance, ahead=ahead, say=lambda line: print(line, flush=True),
+        disturbance=disturbance, ahead=ahead, log=lambda line: print(line, flush=True),
     ) as emulator:  # fmt: skip
         print(f"serial port {port_link or emulator.port}, 115200 baud", flush=True)
         print(f"DCA1000 {board}:{command_port}, sends to {host}:{command_port} and {host}:{data_port}", flush=True)
@@ -348,16 +348,16 @@ def schema(
 
 @app.command()
 def doctor(
-    report: Annotated[bool, typer.Option("--report", help="Print text for a bug report instead.")] = False,
+    report: Annotated[bool, typer.Option("--report", help="Print a text for bug reports instead.")] = False,
 ) -> None:
-    """List what is missing on this machine and how to get it."""
+    """Check the machine for everything that simulation needs, and print how to install what is missing."""
     from radarsim.doctor import describe, examine
 
     if report:
         print(describe())
         return
     if not examine():
-        raise InputError("this machine cannot simulate yet; the lines above say what to type")
+        raise InputError("this machine cannot simulate yet; run the commands above")
 
 
 def main() -> None:

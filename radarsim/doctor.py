@@ -1,9 +1,8 @@
-"""Examines the machine: what is there, what is missing, and the command that gets it.
+"""Check of the machine: what simulation needs, what is missing, and the command that installs it.
 
-``python -m radarsim.doctor --missing-packages`` prints the system packages that are missing. `setup.sh` calls it
-before any Python package is installed, so everything beyond the standard library is imported late.
-``python -m radarsim.doctor --first-frame`` simulates a frame, which compiles the simulator: the last step of
-set-up.
+``python -m radarsim.doctor --missing-packages`` prints the missing system packages. `setup.sh` calls it before any
+Python package is installed, so everything beyond the standard library is imported late. ``python -m radarsim.doctor
+--first-frame`` simulates a frame, which compiles the simulator: the last step of set-up.
 """
 
 import ctypes
@@ -32,13 +31,13 @@ LIBRARIES = {
     "libX11.so.6": "libx11-6",
     "libidn2.so.0": "libidn2-0",
 }
-#: What brings Python packages: the checkout's set-up, or pip where there is none.
+#: Command that installs the Python packages: the checkout's set-up, or pip where there is none.
 REPAIR = "./setup.sh" if Path(__file__).parents[1].joinpath("setup.sh").is_file() else "pip install 'radarize[sim]'"
 PACKAGES = ("torch", "sionna-rt", "mitsuba", "drjit", "gtsam", "open3d", "numba", "h5py", "evo")
-#: A recording of a minute takes about a quarter of this.
+#: Required disk space, bytes; a recording of a minute takes about a quarter of it.
 FREE_DISK = 2e9
 
-# In a process of its own, for what it guards against ends the process.
+# Runs in its own process, because the failure it tests for aborts the process.
 _RAY_TEST = """
 from radarsim.machine import llvm
 llvm.require()
@@ -54,13 +53,13 @@ print("Mitsuba's llvm_ad_mono_polarized variant hits a wall; Sionna RT imports")
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the examination.
+    """One line of the check.
 
     Attributes:
-        what: the thing looked for.
-        state: ``"ok"``, ``"missing"`` (nothing works without) or ``"optional"`` (not there, and not needed).
-        detail: what was found.
-        remedy: the command to type, if any.
+        what: component that is checked.
+        state: ``"ok"``, ``"missing"`` (required) or ``"optional"`` (missing, but not required).
+        detail: result of the check.
+        remedy: command that fixes it, if any.
     """
 
     what: str
@@ -70,7 +69,7 @@ class Finding:
 
 
 def missing_packages() -> list[str]:
-    """Names of the system packages (Debian, Ubuntu) that are missing; none elsewhere than on Linux."""
+    """Names of missing system packages (Debian, Ubuntu); empty on systems other than Linux."""
     if platform.system() != "Linux":
         return []
     packages = [] if llvm.find() else [llvm.PACKAGE]
@@ -86,7 +85,7 @@ def _loads(library: str) -> bool:
 
 
 def findings() -> list[Finding]:
-    """Everything the examination found; takes a few seconds."""
+    """Run all checks; takes a few seconds."""
     return [
         _python(),
         *(_package(name) for name in PACKAGES),
@@ -138,7 +137,7 @@ def _library(library: str) -> Finding:
 
 
 def _tried(what: str, arguments: list[str], longest: float | None = None) -> Finding:
-    """What Python in a process of its own prints; no answer within `longest` s is as bad as a failure."""
+    """Run Python in its own process and return its output; no answer within `longest` s counts as a failure."""
     try:
         done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=longest)
     except subprocess.TimeoutExpired:
@@ -154,7 +153,7 @@ def _ray_test() -> Finding:
 
 
 def first_frame() -> float:
-    """Seconds from nothing to a first frame, of a scene with everything in it; slow where it is not yet compiled."""
+    """Time from start to the first frame of a scene with all features, s; longer if kernels must be compiled."""
     start = time.perf_counter()
     import numpy as np
 
@@ -180,9 +179,9 @@ def _cuda() -> Finding:
     if torch.cuda.is_available():
         return Finding("CUDA", "ok", torch.cuda.get_device_name())
     card = shutil.which("nvidia-smi") is not None
-    # The lock file brings the build for processors; this one brings the CUDA libraries along.
+    # The lock file installs the CPU build; this one includes the CUDA libraries.
     remedy = f".venv/bin/pip install --force-reinstall torch=={torch.__version__.split('+')[0]}" if card else ""
-    return Finding("CUDA", "optional", "a card, but torch cannot use it" if card else "no NVIDIA card", remedy)
+    return Finding("CUDA", "optional", "an NVIDIA GPU that torch cannot use" if card else "no NVIDIA GPU", remedy)
 
 
 def _chromium() -> Finding:
@@ -201,7 +200,7 @@ def _disk() -> Finding:
 
 
 def describe() -> str:
-    """The findings, and what is installed, as text to paste into a bug report; the user's own folder is ``~``."""
+    """Results of the check and installed versions as text for a bug report; the home folder is shown as ``~``."""
     from radarize import __version__
 
     needed = importlib.metadata.requires("radarize") or []
@@ -216,13 +215,13 @@ def describe() -> str:
 
 
 def examine() -> bool:
-    """Print the findings as a table; whether everything that is needed is there."""
+    """Print the results as a table; return whether everything required is there."""
     from radarize.io.console import print_table, working
 
     with working("examining this machine"):
         found = findings()
     print_table(("what", "state", "found"), [(each.what, each.state, each.detail) for each in found])
-    # Outside of the table, whole, so that they can be copied.
+    # Printed outside of the table, without line breaks, so that the commands can be copied.
     for finding in found:
         if finding.remedy:
             print(f"{finding.what} ({finding.state}): {finding.remedy}")

@@ -1,4 +1,4 @@
-"""Where the `radarsim` command begins."""
+"""Entry point of the `radarsim` command."""
 
 from radarize.io.entry import begin
 

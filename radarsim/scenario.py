@@ -1,7 +1,7 @@
-"""What is simulated, and the one way from there to frames.
+"""Scenario (scene, motion, radar, seed) and its frames, computed step by step from paths to samples.
 
-A frame is a function of the scenario and of the instant at which it starts: all random numbers are keyed by the seed,
-what they are for and that instant (`keyed_rng`). So frames can be made in any order and number, again, or elsewhere.
+A frame depends only on the scenario and on the time at which it starts: all random numbers are keyed by the seed,
+their purpose and that time (`keyed_rng`). So frames can be computed in any order and number, on any machine.
 """
 
 from dataclasses import dataclass
@@ -37,15 +37,16 @@ from radarsim.world.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A radar that moves through a scene.
+    """Radar that moves through a scene.
 
     Attributes:
         scene: the world.
-        motion: of the radar.
-        config: of the radar.
-        front_end: what its board is made of; default: what the board's file says.
-        seed: of scatterers, noise, sensors' errors, and what differs from board to board.
-        sensors: beside the radar, names from `radarsim.sensors.suite.SENSORS`; none changes the radar's samples.
+        motion: motion of the radar.
+        config: configuration of the radar.
+        front_end: settings of its front end; default: those of the board's file.
+        seed: seed of scatterers, noise, sensor errors, and variation from board to board.
+        sensors: sensors beside the radar, names from `radarsim.sensors.suite.SENSORS`; none affects the radar's
+            samples.
     """
 
     scene: Scene
@@ -56,21 +57,21 @@ class Scenario:
     sensors: tuple[str, ...] = ()
 
     def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
-        """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.
+        """Frames that start at `times`, ascending, s; each step is computed on first use.
 
         Args:
-            times: on the clock of the motion.
-            end: when the frame after the last one starts, s; default: a frame period later.
+            times: start times on the clock of the motion.
+            end: start of the frame after the last one, s; default: a frame period later.
         """
         times = np.asarray(times, float)
         return Frames(self, times, times[-1] + self.config.frame_period if end is None else end)
 
     @property
     def times(self) -> Float[np.ndarray, "frame"]:
-        """Starts of the frames for which the motion lasts, one after another, s.
+        """Start times of consecutive frames during the motion, s.
 
         Raises:
-            InputError: it lasts for none.
+            InputError: the motion is shorter than a frame.
         """
         count = self.config.frames_within(self.motion.duration)
         if count < 1:
@@ -80,22 +81,22 @@ class Scenario:
         return np.arange(count) * self.config.frame_period
 
     def ticks(self, rate: float) -> Int[np.ndarray, "tick"]:
-        """Numbers of all ticks that a clock of so many Hz makes while the motion lasts, and a frame's ends with it."""
+        """Indices of all ticks of a clock of `rate` Hz during the motion and until the end of its last frame."""
         return Frames(self, np.zeros(1), self.motion.duration + self.config.frame_period).ticks(rate)
 
     def rng(self, purpose: str, time: float | None = None) -> np.random.Generator:
-        """Random numbers for a purpose, at an instant (s) if need be."""
+        """Return the random generator of a purpose, or of a time (s) within it."""
         return keyed_rng(self.seed, purpose, time)
 
     # --- what frames are made with ------------------------------------------------------------------------------------
     @cached_property
     def board(self) -> FrontEnd:
-        """The front end of this very board."""
+        """Front end of this individual board."""
         return FrontEnd(self.config, self.front_end, self.rng("board"))
 
     @cached_property
     def finder(self) -> PathFinder:
-        """Finds the echoes of a pose."""
+        """Finder of the propagation paths at a pose."""
         weakest, antenna = self.board.weakest, self.board.settings.pattern
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
         surface, clutter = Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter"))
@@ -106,7 +107,7 @@ class Scenario:
 
     @cached_property
     def path_types(self) -> PathTypes:
-        """Tells ghosts from echoes of what is really there."""
+        """Classifier of paths by type: direct, ghost, and others."""
         return PathTypes(self.scene, self.config, gain_pattern(self.board.settings.pattern))
 
     @cached_property
@@ -115,27 +116,27 @@ class Scenario:
 
     @cached_property
     def interference(self) -> Interference:
-        """Makes the signal of the scene's other radars."""
+        """Model of the signals from the scene's other radars."""
         obstacles = Obstacles.of(self.scene, self._moving, self.config)
         return Interference(self.scene.interferers, self.board, obstacles)
 
     @cached_property
     def synthesize(self) -> Synthesizer:
-        """Sums echoes to the beat signal."""
+        """Synthesizer of the beat signal from paths."""
         return Synthesizer(self.config)
 
     @cached_property
     def rays(self) -> RayCaster:
-        """What cameras and scanners see: first surfaces, things that move included."""
+        """Ray caster for cameras and lidars: first surfaces, moving objects included."""
         return RayCaster(self.scene)
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Some frames of a scenario, each step from the paths to the samples made when it is first asked for.
+    """Frames of a scenario; each step from paths to samples is computed on first use.
 
     Attributes:
-        scenario: that they are of.
+        scenario: their scenario.
         times: start of each frame's first chirp, ascending, s.
         end: start of the frame after the last, s.
     """
@@ -149,13 +150,13 @@ class Frames:
 
     @property
     def middles(self) -> Float[np.ndarray, "frame"]:
-        """The middle of each burst, s."""
+        """Centre time of each burst, s."""
         return self.times + self.scenario.config.burst_center
 
     @cached_property
     @one_blas_thread
     def paths(self) -> list[Paths]:
-        """Propagation paths of each frame, found at the middle of the burst."""
+        """Propagation paths of each frame at the centre of its burst."""
         motion, middles = self.scenario.motion, self.middles
         return self.scenario.finder.batch(motion.position(middles), motion.rotation(middles).as_matrix(), middles)
 
@@ -167,12 +168,12 @@ class Frames:
         poses = motion.position(times).reshape(-1, 3, 3), motion.rotation(times).as_matrix().reshape(-1, 3, 3, 3)
         found = [p.lengths_from(*pose, config) for p, *pose in zip(self.paths, *poses, strict=True)]
         for each in found:
-            each[..., 0] += 2 * config.range_bias  # a board's own delay, which the pipeline takes off again
+            each[..., 0] += 2 * config.range_bias  # the board's delay, which the pipeline subtracts
         return found
 
     @cached_property
     def received(self) -> list[Complex[np.ndarray, "path"]]:
-        """Amplitudes of each frame's paths behind the IF filters."""
+        """Amplitudes of each frame's paths after the IF filters."""
         response = self.scenario.board.if_response
         pairs = zip(self.lengths, self.paths, strict=True)
         return [p.amplitude * response(length[:, 0, 0]) for length, p in pairs]
@@ -180,7 +181,7 @@ class Frames:
     @cached_property
     @one_blas_thread
     def types(self) -> list[UInt8[np.ndarray, "path"]]:
-        """Type of each frame's paths."""
+        """Path type of each frame's paths."""
         motion, middles = self.scenario.motion, self.middles
         lengths = [each[..., 0] - 2 * self.scenario.config.range_bias for each in self.lengths]
         poses = motion.position(middles), motion.rotation(middles).as_matrix()
@@ -189,13 +190,13 @@ class Frames:
     @cached_property
     @one_blas_thread
     def interference(self) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
-        """What the scene's other radars add to each frame's signal behind the IF filters."""
+        """Signal of the scene's other radars in each frame, after the IF filters."""
         return [self.scenario.interference(self.scenario.motion, t) for t in self.times]
 
     @cached_property
     @one_blas_thread
     def samples(self) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
-        """I/Q as the converter gives it."""
+        """I/Q samples after the analogue-to-digital converter."""
         board, rng = self.scenario.board, self.scenario.rng
         signals = map(self.scenario.synthesize, self.lengths, self.received)
         if self.scenario.scene.interferers:
@@ -203,6 +204,6 @@ class Frames:
         return np.stack([board.digitize(s, rng("noise", t)) for t, s in zip(self.times, signals, strict=True)])
 
     def ticks(self, rate: float) -> Int[np.ndarray, "tick"]:
-        """Numbers of the ticks that a clock of so many Hz, which starts at 0, makes from the first frame to the end."""
+        """Indices of the ticks of a clock of `rate` Hz, which starts at 0, from the first frame to the end."""
         first, last = np.ceil(np.array([self.times[0], self.end]) * rate - 1e-6).astype(int)
         return np.arange(first, last)

@@ -1,4 +1,4 @@
-"""A page with a scene in 3-D: the building cut open, a tour through it, and the echoes of a frame as rays by cause."""
+"""Interactive 3-D page of a scene: the building cut open, a tour, and a frame's propagation paths by path type."""
 
 from pathlib import Path
 
@@ -15,23 +15,23 @@ from radarsim.scenario import Scenario
 from radarsim.world.preview.rendering import cut_open
 from radarsim.world.scene import Scene
 
-#: Rays of each cause that are drawn, the strongest.
+#: Number of rays drawn per path type, the strongest first.
 RAYS = 80
-#: By cause, as in the viewer.
-_CAUSES = ("#39d0d8", "#8b949e", "#9a6fd0", "#e4572e", "#2e9e6b")
+#: Colours by path type, as in the viewer.
+_COLOURS = ("#39d0d8", "#8b949e", "#9a6fd0", "#e4572e", "#2e9e6b")
 _STEP = 0.1  # s between points of the tour
 _GLASS = 0.25
 
 
 def web_preview(scene: Scene, output: Path, walk: Walk | None = None, time: float = 0.0, seed: int = 0) -> Path:
-    """Write a page that opens without a network.
+    """Write a 3-D page of a scene that opens without a network.
 
     Args:
         scene: the world.
         output: page to write (``.html``).
-        walk: the tour that is drawn; default: 40 s by hand.
-        time: of the frame whose echoes are drawn, s from the tour's beginning.
-        seed: of the tour and of all that the scene leaves open.
+        walk: the tour that is drawn; default: a handheld one of 40 s.
+        time: start of the frame whose echoes are drawn, s from the start of the tour.
+        seed: seed of the tour and of the scene's random choices.
 
     Raises:
         InputError: no room to move, or the page cannot be written.
@@ -47,20 +47,19 @@ def web_preview(scene: Scene, output: Path, walk: Walk | None = None, time: floa
     figure.update_layout(scene={"aspectmode": "data", "xaxis": hidden, "yaxis": hidden, "zaxis": hidden})
     page.plot(figure, height=720)
     page.text(
-        f"Of each cause the {RAYS} strongest echoes. Rays over mirrors are drawn unfolded: straight to where the thing "
-        "seems to be for the transmitter, and from where it seems to be for the receiver. A click on a cause hides it."
+        f"The {RAYS} strongest echoes of each path type. Rays over mirrors are drawn unfolded: straight to the "
+        "apparent place of the target for the transmitter, and from its apparent place for the receiver. "
+        "A click on a path type hides it."
     )
     counts = np.bincount(types, minlength=len(PathType))
     powers = np.bincount(types, np.abs(paths.amplitude) ** 2, minlength=len(PathType))
-    rows = [
-        (_words(cause), counts[cause], f"{10 * np.log10(powers[cause]):.1f}") for cause in PathType if counts[cause]
-    ]
-    page.table(("cause", "echoes", "received over transmitted power, dB"), rows, numbers=(1, 2))
+    rows = [(_words(each), counts[each], f"{10 * np.log10(powers[each]):.1f}") for each in PathType if counts[each]]
+    page.table(("path type", "echoes", "received over transmitted power, dB"), rows, numbers=(1, 2))
     return page.write(output)
 
 
-def _words(cause: PathType) -> str:
-    return cause.name.lower().replace("_", " ")
+def _words(path_type: PathType) -> str:
+    return path_type.name.lower().replace("_", " ")
 
 
 def _building(scene: Scene) -> list[go.Mesh3d]:
@@ -87,14 +86,14 @@ def _rays(paths: Paths, types: UInt8[np.ndarray, "path"], place: Float[np.ndarra
     # A mirror of flat parts seems to hold the receiver's image: half-way to it the ray meets the mirror.
     ends = paths.apparent(place)
     found = []
-    for cause in PathType:
-        members = np.flatnonzero(types == cause)
+    for path_type in PathType:
+        members = np.flatnonzero(types == path_type)
         members = members[np.argsort(-np.abs(paths.amplitude[members]), kind="stable")][:RAYS]
         if not len(members):
             continue
         here, gap = np.broadcast_to(place, (len(members), 3)), np.full((len(members), 3), np.nan)
         there, back = ends[members].transpose(1, 0, 2)
         x, y, z = np.stack([here, there, gap, back, here, gap], axis=1).reshape(-1, 3).T.round(3)
-        line = {"color": _CAUSES[cause], "width": 2}
-        found.append(go.Scatter3d(x=x, y=y, z=z, mode="lines", name=_words(cause), line=line, hoverinfo="name"))
+        line = {"color": _COLOURS[path_type], "width": 2}
+        found.append(go.Scatter3d(x=x, y=y, z=z, mode="lines", name=_words(path_type), line=line, hoverinfo="name"))
     return found

@@ -24,7 +24,7 @@ _calls: Counter[Callable] = Counter()
 
 
 def install() -> None:
-    """From now on, in whatever is imported of both packages."""
+    """Check array shapes and kinds in all modules of both packages imported from now on."""
     plain = jaxtyping.jaxtyped
 
     def only_arrays(typechecker):
@@ -43,12 +43,12 @@ def install() -> None:
 
 
 def begin_test() -> None:
-    """Calls are first ones again: what is checked in a test does not depend on those before it."""
+    """Reset the call counts, so that the checks in a test do not depend on earlier tests."""
     _calls.clear()
 
 
 def arrays(function: Callable) -> Callable:
-    """A function whose arrays are checked."""
+    """Wrap a function so that its arrays are checked."""
     hints = dict(function.__annotations__)
     function.__annotations__ = {name: hint for name, hint in hints.items() if _has_array(hint)}
     if not function.__annotations__:
@@ -60,7 +60,7 @@ def arrays(function: Callable) -> Callable:
 
 
 def _sampled(checked: Callable, function: Callable) -> Callable:
-    """The checked function in some of its calls, and the function itself in the others."""
+    """Call the checked function in some calls, and the function itself in the others."""
 
     @wraps(function)
     def either(*args, **options):
@@ -72,14 +72,14 @@ def _sampled(checked: Callable, function: Callable) -> Callable:
 
 
 def _takes_arrays(thing: type | Callable) -> bool:
-    """Whether a data class or function takes arrays or returns them."""
+    """Whether a data class or function has array annotations."""
     if isclass(thing):
         return dataclasses.is_dataclass(thing) and _takes_arrays(thing.__init__)
     return any(map(_has_array, thing.__annotations__.values()))
 
 
 def _has_array(hint: object) -> bool:
-    """An array, one among others, or several; those of a list or mapping may have any shapes."""
+    """Whether an annotation is an array, or contains arrays; those in a list or mapping may have any shapes."""
     if get_origin(hint) in (tuple, Union, UnionType):
         return any(map(_has_array, get_args(hint)))
     return isinstance(hint, type) and issubclass(hint, AbstractArray)

@@ -23,8 +23,8 @@ def pytest_runtest_setup():
 
 
 def pytest_configure(config):
-    """Temporary files of commands, browsers and clusters go into one folder, which goes with the session. It has a
-    short name, for sockets lie in it; pytest's own folders stay where they are."""
+    """Put temporary files of commands, browsers and clusters into one folder that is removed with the session. Its name
+    is short because of sockets; pytest's own folders are not changed."""
     if not hasattr(config, "workerinput"):
         os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
         os.environ["TMPDIR"] = tempfile.tempdir = tempfile.mkdtemp(prefix="rz-")
@@ -32,13 +32,13 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    """What takes longest begins first: nobody waits for it in the end."""
+    """Run the slowest tests first, so that none of them runs alone at the end."""
     items.sort(key=lambda item: LONGEST.isdisjoint(item.path.parts))
 
 
 @pytest.fixture(scope="session")
 def recordings() -> Path:
-    """Public recordings beside the repository."""
+    """Folder of public recordings beside the repository."""
     folder = Path(__file__).resolve().parents[2] / "shared" / "recordings"
     if not folder.is_dir():
         pytest.skip(f"the public recordings are not at {folder}")
@@ -54,7 +54,7 @@ def small_disk(tmp_path) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def one_thread():
-    """Torch with one thread, as a worker has: of small matrices more threads wait for each other."""
+    """Use one thread in torch, as in a worker: for small matrices more threads are slower."""
     import torch
 
     before = torch.get_num_threads()
@@ -65,7 +65,7 @@ def one_thread():
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Address of a Ray cluster: two nodes of one core each on this machine, which can import what the test can."""
+    """Address of a Ray cluster: two nodes of one core each on this machine, with the test's import path."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_worker_niceness", "0")  # 15 by default: other tests would not let them work

@@ -1,4 +1,4 @@
-"""Small disks, and full ones."""
+"""Small and full disks."""
 
 import errno
 import os
@@ -12,7 +12,7 @@ import pytest
 
 @contextmanager
 def disk(folder: Path, size: int, image: Path | None = None) -> Iterator[Path]:
-    """A file system of so many kiB, in a file or in memory, where root can mount one."""
+    """A file system of a given size in KiB, in a file or in memory, if root can mount one."""
     folder.mkdir()
     if image is None:
         mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", folder]
@@ -28,7 +28,7 @@ def disk(folder: Path, size: int, image: Path | None = None) -> Iterator[Path]:
 
 
 def fill(path: Path) -> None:
-    """Take all room that a disk has left, for a file."""
+    """Fill a disk with a file."""
     with path.open("wb", buffering=0) as file:
         size = 1 << 30
         while size >= 1 << 12:

@@ -18,7 +18,7 @@ def radar(board: str | Path) -> RadarConfig:
     return PRESETS["radarize"].changed("radar", **fields)
 
 
-def tells_elevation(config: RadarConfig) -> bool:
-    """Whether a board's antennas stand in more than one row."""
+def resolves_elevation(config: RadarConfig) -> bool:
+    """Whether a board's antennas are in more than one row."""
     board = load_board(config.board)
     return len({height for _, height in board.tx}) * len({height for _, height in board.rx}) > 1

@@ -1,4 +1,4 @@
-"""What depends on what, and how much a function takes."""
+"""Dependences between packages, and limits on their size and on arguments of functions."""
 
 import ast
 import re
@@ -64,7 +64,7 @@ def modules(package: str) -> dict[str, Path]:
 
 @cache
 def imported(package: str) -> dict[str, set[str]]:
-    """What each file of a package imports, anywhere in it, functions and TYPE_CHECKING included."""
+    """Imports of each file of a package, including those in functions and under TYPE_CHECKING."""
     found: dict[str, set[str]] = {}
     for name, path in modules(package).items():
         found[name] = set()
@@ -195,7 +195,7 @@ def test_help_is_quick():
     ],
 )
 def test_what_comes_from_elsewhere_is_opened_in_one_place(call, home):
-    """Where its guards are."""
+    """Foreign files are opened only in the modules with the guards."""
     found = {
         path.stem
         for package in ("radarize", "radarsim")

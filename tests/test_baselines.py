@@ -12,7 +12,7 @@ import pytest
 from radarize.io.plugins import Plugins
 
 ROOT = Path(__file__).parents[1]
-#: Of an editable installation, whose finder knows where the folder is.
+#: Editable installation, whose finder maps the package to its folder.
 ALONE = """
 import sys
 sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder).lower()]

@@ -44,7 +44,7 @@ def small_recording(path: Path, frames: int = 2) -> Path:
 
 @pytest.mark.parametrize("name", APPS)
 def test_help_is_instant(name):
-    """In processor time: others may have the clock's."""
+    """Measured in processor time, which does not depend on other processes."""
     seconds = []
     for _ in range(3):
         before = os.times()
@@ -154,7 +154,7 @@ def test_debug_shows_the_traceback():
     assert done.returncode != 0 and "Traceback" in done.stderr and "InputError" in done.stderr
 
 
-def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
+def test_an_interrupt_reports_what_was_kept(capsys, monkeypatch, tmp_path):
     def interrupted(scene, output, **_):
         config = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
         with RecordingWriter(output, config) as writer:
@@ -210,7 +210,7 @@ def test_info(capsys, tmp_path):
 
 
 def test_info_shows_attributes_as_they_are(capsys, tmp_path):
-    """What looks like markup, an emoji or a terminal's command is data."""
+    """Text that looks like markup, an emoji or a terminal's control sequence is shown as it is."""
     odd = {"[imu]": "a [bold]plate[/bold]", "closing": "[/x]", "smile": ":smile:", "red": "\x1b[31mred"}
     path, config = tmp_path / "[b]odd[imu].h5", PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
     with RecordingWriter(path, config, attributes=odd) as writer:

@@ -1,4 +1,4 @@
-"""What CONTRIBUTING.md and the workflow point at is there."""
+"""Files named in CONTRIBUTING.md and in the workflow exist."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a scenario makes frames with: ranges that fold, random numbers by purpose and instant."""
+"""Parameters of a scenario in its frames: ranges that fold, random numbers by purpose and time."""
 
 import numpy as np
 import pytest

@@ -84,14 +84,14 @@ def test_what_tests_and_benchmarks_import_is_declared():
 
 
 def test_every_extras_modules_are_known():
-    """So that a command that misses one says which extra it is of."""
+    """Commands with a missing package name its extra."""
     for extra, modules in EXTRAS.items():
         declared = names(*PROJECT["optional-dependencies"][extra]) - names(*PROJECT["dependencies"])
         assert all(declared & distributions({module}) for module in modules)
         assert declared <= distributions(modules)
 
 
-def test_the_version_is_said_once():
+def test_the_version_is_printed_once():
     assert PROJECT["dynamic"] == ["version"]
     assert f'\nversion: "{__version__}"' in (ROOT / "CITATION.cff").read_text()
     assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == __version__
@@ -137,13 +137,13 @@ def test_a_second_setup_does_nothing():
 
 
 def test_what_is_imported_stays_compiled_though_the_shell_forbids_it():
-    told = ["make", "-sC", ROOT, "--eval", "told: ; @echo $${PYTHONDONTWRITEBYTECODE-nothing}", "told"]
+    shown = ["make", "-sC", ROOT, "--eval", "shown: ; @echo $${PYTHONDONTWRITEBYTECODE-nothing}", "shown"]
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    assert subprocess.run(told, env=environment, capture_output=True, text=True).stdout == "nothing\n"
+    assert subprocess.run(shown, env=environment, capture_output=True, text=True).stdout == "nothing\n"
     assert "\nunset PYTHONDONTWRITEBYTECODE\n" in (ROOT / "setup.sh").read_text()
 
 
-def test_without_python_setup_says_what_to_type(tmp_path):
+def test_without_python_setup_prints_what_to_type(tmp_path):
     shutil.copy(ROOT / "setup.sh", tmp_path)
     tools = tmp_path / "tools"
     tools.mkdir()
@@ -224,7 +224,7 @@ def test_doctor_writes_a_report_that_names_no_folder_of_the_user(monkeypatch):
     assert f"numpy {LOCK['numpy']}" in text and f"mitsuba {LOCK['mitsuba']}" in text and str(Path.home()) not in text
 
 
-def test_doctor_says_what_is_missing(monkeypatch, capsys):
+def test_doctor_lists_what_is_missing(monkeypatch, capsys):
     monkeypatch.setitem(doctor.LIBRARIES, "libnothing.so.7", "libnothing7")
     monkeypatch.setattr(doctor, "_ray_test", lambda: doctor.Finding("ray test", "ok", ""))
     monkeypatch.setattr(doctor, "_first_frame", lambda: doctor.Finding("first frame", "ok", ""))

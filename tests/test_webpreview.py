@@ -21,13 +21,13 @@ def test_it_shows_building_tour_and_echoes(tmp_path):
     motion = WALK.through(scene, 0)
     scenario = Scenario(scene, motion, PRESETS["radarize"], seed=0)
     frame = scenario.frames(np.array([1.0]))
-    causes = set(frame.types[0].tolist())
+    types = set(frame.types[0].tolist())
     page = web_preview(scene, tmp_path / "room.html", WALK, time=1.0)
     with Browser(page.as_uri(), tmp_path / "profile") as browser:
         browser.wait("document.querySelectorAll('.js-plotly-plot').length === 1")
         assert browser.evaluate("document.querySelector('h1').textContent") == scene.name
         names = browser.evaluate(DATA.format("type === 'scatter3d'", "name"))
-        assert names[:2] == ["tour", "direct"] and len(names) == 1 + len(causes)
+        assert names[:2] == ["tour", "direct"] and len(names) == 1 + len(types)
         corners = browser.evaluate(DATA.format("type === 'mesh3d'", "x.length"))
         assert corners == [len(item.mesh.vertices) for item in cut_open(scene)]
         (place,) = browser.evaluate(DATA.format("name === 'direct'", "x[0]"))

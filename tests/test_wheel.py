@@ -1,4 +1,4 @@
-"""What is installed elsewhere: built as a publisher builds it, used outside of the repository."""
+"""Installed package: built like a published one, used outside of the repository."""
 
 import os
 import shutil
@@ -147,7 +147,7 @@ def test_the_pipeline_needs_nothing_of_the_simulator(walked, installed):
     "command",
     ["simulate office -o x.h5", "dataset small -o x", "scene info office", "emulate office"],
 )
-def test_what_needs_the_simulator_says_how_to_get_it(walked, installed, command):
+def test_what_needs_the_simulator_names_how_to_get_it(walked, installed, command):
     done = installed(f"radarsim {command}", simulator=False)
     assert done.returncode == 2, done.stderr
     assert "pip install 'radarize[sim]'" in done.stderr and done.stderr.count("\n") == 1

@@ -80,7 +80,7 @@ def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulato
     with Emulator(
         Playback(source) if isinstance(source, Path) else source,
         addresses=Addresses(where.dca, where.host, where.command_port, where.data_port),
-        **{"say": lambda words: None} | options,
+        **{"log": lambda words: None} | options,
     ) as emulator:
         while not emulator.ready:
             time.sleep(0.02)
@@ -94,17 +94,17 @@ def sensor(emulator: Emulator, where: NetworkAddresses, config: RadarConfig = SM
 
 @dataclass
 class Running:
-    """An emulator's process, its serial port and UDP ports, and, when it has ended, what it said."""
+    """An emulator's process, its serial port and UDP ports, and, when it has ended, what it output."""
 
     process: subprocess.Popen
     port: Path
     command_port: int
     data_port: int
-    said: str = ""
+    output: str = ""
 
     @property
     def options(self) -> list[str]:
-        """Of `radarize capture` and `live`, to find it."""
+        """Options of `radarize capture` and `live` for the virtual radar."""
         found = {
             "--port": self.port, "--host": COMPUTER, "--dca": BOARD,
             "--command-port": self.command_port, "--data-port": self.data_port,
@@ -128,5 +128,5 @@ def emulator(source: Path | str, folder: Path, *options: object) -> Iterator[Run
         yield running
     finally:
         process.send_signal(signal.SIGINT)
-        running.said = process.communicate(timeout=60)[0]
+        running.output = process.communicate(timeout=60)[0]
     assert process.returncode == 0 and not running.port.is_symlink()

@@ -1,4 +1,4 @@
-"""The pipeline on a radar, or on a recording in real time, frame by frame."""
+"""Python interface of live processing: the pipeline on a radar, or on a recording in real time, frame by frame."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class LiveOptions(TypedDict, total=False):
-    """How the radar is reached, what methods are made of, what else is done with frames: of ``radarize live``."""
+    """Options of ``radarize live``: access to the radar, settings of the methods, further outputs."""
 
     weights: str | Path | None
     pipeline: Configuration | str | Path | None
@@ -54,19 +54,19 @@ class LiveOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
-    """A frame just after it came. ``rz.range_azimuth(frame)`` and the like make maps and points of it.
+    """Result of a frame just received. ``rz.range_azimuth(frame)`` and similar functions make maps and points of it.
 
     Attributes:
-        number: of the frame.
-        time: s, middle of its burst.
-        pose: (3,) x, y (m), yaw (rad) on the map as it is now.
+        number: number of the frame.
+        time: s, centre of its burst.
+        pose: (3,) x, y (m), yaw (rad) on the current map.
         velocity: (2,) m/s in the sensor's frame: forward, left.
-        ranges: (88,) the scan, m, inf where nothing is seen, on `azimuths`.
+        ranges: (88,) the scan, m, inf without a return, on `azimuths`.
         samples: (1, loop, tx, rx, sample, 2) raw I/Q, ADC counts.
         valid: (1, loop, tx) False where samples were lost.
         times: (1,) s, start of its first chirp.
-        config: of the radar.
-        session: that it is of.
+        config: radar configuration.
+        session: its session.
     """
 
     number: int
@@ -96,25 +96,25 @@ class LiveFrame:
 
     @property
     def numbers(self) -> range:
-        """The number alone."""
+        """Range with the number of the frame only."""
         return range(self.number, self.number + 1)
 
     @property
     def map(self) -> OccupancyMap:
-        """The map as it is now, drawn when asked for."""
+        """Current map, drawn on first use."""
         return self.session.map
 
 
 class LiveSession:
-    """Frames of a stream, with what the pipeline makes of them: ``for frame in session``. Leaving the loop stops the
-    radar. A context manager, for who wants to know `url` before the first frame.
+    """Frames of a stream with the pipeline's results: ``for frame in session``. Leaving the loop stops the radar. A
+    context manager, if `url` is needed before the first frame.
 
     Attributes:
         stream: the radar or the replay.
         methods: odometry and scans by name.
-        most: frames after which it ends; None: none.
+        most: number of frames after which it ends; None: no limit.
         live: the pipeline, once entered.
-        server: Foxglove's, once entered; None without.
+        server: Foxglove server, once entered; None without one.
     """
 
     live: Live
@@ -124,10 +124,10 @@ class LiveSession:
         self, stream: FrameStream, inputs: Inputs, methods: dict[str, str], most: int | None, options: LiveOptions
     ):
         self.stream, self.methods, self.most = stream, methods, most
-        self._threads = torch.get_num_threads()  # which `prepare` sets to one
+        self._threads = torch.get_num_threads()  # `prepare` sets it to one
         self._inputs, self._options, self._stack = prepare(inputs, methods), options, ExitStack()
         self._keeper: Keeper | None = None
-        self._told: list[str] = []
+        self._final_warnings: list[str] = []
         self._entered = False
 
     def __enter__(self) -> "LiveSession":
@@ -149,7 +149,7 @@ class LiveSession:
 
     def __exit__(self, *error: Any) -> None:
         if error[0] is None:
-            self._told = self.warnings  # while the board can still be asked
+            self._final_warnings = self.warnings  # while the board still answers
         self._entered = False
         torch.set_num_threads(self._threads)
         self._stack.__exit__(*error)
@@ -161,20 +161,20 @@ class LiveSession:
         with self:
             try:
                 yield from self.frames()
-            except GeneratorExit:  # who leaves the loop ends the stream, and its recording is whole
+            except GeneratorExit:  # leaving the loop ends the stream and completes its recording
                 return
 
     def frames(
         self, stopping: Event | None = None, progress: Callable[[int, int], None] = lambda done, total: None
     ) -> Iterator[LiveFrame]:
-        """Frames of an entered session that odometry uses.
+        """Yield the frames of an entered session that odometry uses.
 
         Args:
-            stopping: set by who wants to end; what is on its way still comes.
-            progress: called with (frames done, frames wanted, 0 if unknown).
+            stopping: event that ends the session; frames already received are still processed.
+            progress: called with (frames done, total frames, 0 if unknown).
 
         Raises:
-            InputError: nothing comes, or the stream fails.
+            InputError: no frames arrive, or the stream fails.
         """
         pushed = self.live.follow(
             self.stream, stopping or Event(), frames=self.most, keeper=self._keeper, progress=progress
@@ -196,19 +196,19 @@ class LiveSession:
 
     @property
     def url(self) -> str | None:
-        """Of the page, once entered; None without one."""
+        """Address of the page, once entered; None without one."""
         return getattr(self.live.page, "url", None)
 
     @property
     def map(self) -> OccupancyMap:
-        """The map as it is now."""
+        """Current map."""
         return OccupancyMap.of(self.live.pipeline.slam.map())
 
     @property
     def warnings(self) -> list[str]:
-        """What is wrong with the stream and its recording so far, and where odometry had a hard time."""
+        """Warnings on the stream, its recording, and intervals of poor odometry, so far."""
         if not self._entered:
-            return self._told
+            return self._final_warnings
         return [*self.live.troubles(self.stream), *self.live.losses.warnings(), *self.live.pipeline.slam.warnings()]
 
 
@@ -230,25 +230,25 @@ def live(
     nothing.
 
     Args:
-        config: of the radar: a preset, a ``.cfg`` file, or a `RadarConfig`.
+        config: radar configuration: a preset, a ``.cfg`` file, or a `RadarConfig`.
         port: the radar's serial command port.
         replay: a recording (``.h5``) to play instead of a radar.
         odometry, scans: methods by name, see `run`.
-        every: follow every N-th frame; by default as the networks were taught.
-        duration: end after so many s.
-        frames: end after so many frames.
-        options: ``weights``: folder of the networks' weights, by default the shipped ones; ``pipeline``: its settings,
-            or a YAML file of them, as ``config`` of `run`; ``baud`` of the port; ``host`` (this computer), ``dca``,
-            ``command_port`` and ``data_port`` of the DCA1000; ``output``: record as well (``.h5``), ``overwrite`` one
-            that is there; ``address`` (``HOST:PORT``) of a local page that shows it, ``foxglove`` of a server for
-            Foxglove; ``board``: file of the board with its calibration, see `calibrate`.
+        every: use every N-th frame; default: as in the networks' training.
+        duration: end after this time, s.
+        frames: end after this number of frames.
+        options: ``weights``: folder of the networks' weights, default: those of the package; ``pipeline``: its
+            settings, or a YAML file of them, as ``config`` of `run`; ``baud`` of the port; ``host`` (this computer),
+            ``dca``, ``command_port`` and ``data_port`` of the DCA1000; ``output``: record as well (``.h5``),
+            ``overwrite`` an existing one; ``address`` (``HOST:PORT``) of a local page with the live view, ``foxglove``
+            of a server for Foxglove; ``board``: file of the board with its calibration, see `calibrate`.
 
     Returns:
         A session to iterate over: a `LiveFrame` for each frame that odometry uses, with pose, velocity and scan.
         Leaving the loop stops the radar.
 
     Raises:
-        InputError: neither radar nor recording, or what the radar, the board, or the recording cannot do.
+        InputError: neither radar nor recording, or an error of the radar, the board, or the recording.
 
     Example:
         >>> for frame in rz.live(replay="walk.h5", odometry="doppler", scans="first-echo", frames=8):
@@ -273,7 +273,7 @@ def live(
 
 
 def sensor(config: str | Path | RadarConfig | None, port: str | None, options: LiveOptions) -> Sensor:
-    """A radar on its serial port, and its capture card.
+    """Connect a radar on its serial port, and its capture card.
 
     Raises:
         InputError: no configuration or port, or see `Sensor`.
@@ -288,6 +288,6 @@ def sensor(config: str | Path | RadarConfig | None, port: str | None, options: L
 
 
 def frames_within(duration: float | None, frames: int | None, period: float) -> int | None:
-    """Frames after which a stream ends; None: none."""
+    """Number of frames after which a stream ends; None: no limit."""
     limits = [frames, None if duration is None else max(round(duration / period), 1)]
     return min((limit for limit in limits if limit is not None), default=None)

@@ -1,4 +1,4 @@
-"""The DCA1000 as seen from the computer: commands and replies over UDP."""
+"""DCA1000 capture board: commands and replies over UDP, from the computer's side."""
 
 import errno
 import socket
@@ -20,9 +20,9 @@ from radarize.radar.dca1000_commands import (
     packet_settings,
 )
 
-#: s for a reply; requests are repeated, since UDP may lose them.
+#: Timeout of a reply, s; requests are repeated, since UDP may lose them.
 _PATIENCE, _ATTEMPTS = 1.0, 3
-#: Delay between packets, s, the usual one first, and the Mbit/s that it lets through.
+#: Delays between packets, s, the usual one first, and their data rates, Mbit/s.
 _THROUGHPUT = {25e-6: 325.0, 10e-6: 545.0, 5e-6: 706.0}
 _TROUBLE = {
     Status.NO_LVDS: "gets no samples from the radar; is the ribbon cable in, and lvdsStreamCfg -1 0 1 0 configured?",
@@ -36,7 +36,7 @@ class NetworkAddresses:
     """Addresses and ports; the defaults are those of a board as delivered.
 
     Attributes:
-        host: this computer's address, where packets arrive.
+        host: address of this computer, to which packets are sent.
         dca: the board's address.
         command_port, data_port: UDP.
     """
@@ -47,10 +47,10 @@ class NetworkAddresses:
     data_port: int = DATA_PORT
 
     def bind(self, port: int) -> socket.socket:
-        """A UDP socket at `host`.
+        """Bind a UDP socket to `host`.
 
         Raises:
-            InputError: the address is none of this computer, or the port is taken.
+            InputError: the address is none of this computer's, or the port is in use.
         """
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -93,16 +93,16 @@ class CaptureCard:
         self._socket.close()
 
     def configure(self, config: RadarConfig) -> str:
-        """Set the board up for raw samples of a configuration; returns the version of its firmware.
+        """Configure the board for raw samples of a configuration; return its firmware version.
 
         Raises:
-            InputError: it does not answer or refuses, or the radar would send more than it can pass on.
+            InputError: no reply or an error, or a data rate beyond the board's.
         """
         rate = 8e-6 * config.frame_bytes * config.frame_rate
         if rate > max(_THROUGHPUT.values()):
             limit = max(_THROUGHPUT.values())
             raise InputError(f"radar configuration: sends {rate:.0f} Mbit/s, expected at most the DCA1000's {limit:g}")
-        # A quarter to spare for its bursts, where there is one.
+        # A margin of a quarter for bursts, if there is one.
         delay = next((d for d, limit in _THROUGHPUT.items() if rate < 0.75 * limit), min(_THROUGHPUT))
         self.request(Opcode.ALIVE)
         self.request(Opcode.RESET_FPGA)
@@ -112,19 +112,19 @@ class CaptureCard:
         return f"{version & 0x7F}.{version >> 7 & 0x7F}"
 
     def start(self) -> None:
-        """Pass samples on from now."""
+        """Start to forward samples."""
         self._reported = Status(0)
         self.request(Opcode.START)
 
     def stop(self) -> None:
-        """Pass no more samples on."""
+        """Stop forwarding samples."""
         self.request(Opcode.STOP)
 
     def request(self, command: Opcode, body: bytes = b"", answer: bool = False) -> int:
-        """Send a command; returns the status of its reply.
+        """Send a command; return the status of its reply.
 
         Args:
-            answer: the status is no success or failure but what was asked for.
+            answer: the status is a value, not success or failure.
 
         Raises:
             InputError: no reply, or failure.
@@ -152,7 +152,7 @@ class CaptureCard:
         )
 
     def status(self, patience: float = 0.0) -> Status:
-        """What the board has reported on its own since `start`."""
+        """Status reported by the board since `start`, without a request."""
         deadline = time.monotonic() + patience
         while self._hear(deadline):
             pass
@@ -164,9 +164,10 @@ class CaptureCard:
         return [f"the DCA1000 {words}" for bit, words in _TROUBLE.items() if reported & bit]
 
     def _hear(self, deadline: float) -> Reply | None:
-        """The board's next reply until an instant (monotonic, s); reports of its own are noted.
+        """Next reply of the board until a deadline (monotonic, s); unsolicited reports are stored.
 
-        It replies from one port of its address, whichever (real ones from 1024): once it has, nobody else is heard.
+        It replies from one port of its address, (real boards: 1024), which is not known in advance; after its first
+        reply, other senders are ignored.
         """
         while True:
             self._socket.settimeout(max(deadline - time.monotonic(), 0.0))

@@ -1,4 +1,4 @@
-"""A check of the first seconds of a stream, beside the pipeline."""
+"""Check of the first seconds of a stream, in parallel to the pipeline."""
 
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
@@ -10,15 +10,15 @@ from radarize.pipeline.check.check import check_evidence
 from radarize.pipeline.check.evidence import Evidence
 from radarize.radar.config import RadarConfig
 
-#: s of frames that are looked at, and bytes that they may take.
+#: Duration of the frames that are checked, s, and their largest memory, bytes.
 _LASTS, _MOST = 5.0, 128 << 20
 
 
 class FirstLook:
-    """Keeps the first frames until there are enough, and checks them in a thread; then it lets go of them.
+    """Collect the first frames of a stream and check them in a thread.
 
     Args:
-        config: of the radar.
+        config: radar configuration.
     """
 
     def __init__(self, config: RadarConfig):
@@ -33,7 +33,7 @@ class FirstLook:
         times: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"],
     ) -> None:
-        """Take in the next frames."""
+        """Add the next frames."""
         if self._found is not None:
             return
         self._kept.append((adc.copy(), times.copy(), valid.copy()))
@@ -41,7 +41,7 @@ class FirstLook:
             self._begin()
 
     def finish(self) -> None:
-        """Check what came, if the stream ends before there was enough, and wait until that is done."""
+        """Check the frames received, if the stream ends early, and wait for the result."""
         if self._found is None and self._kept:
             self._begin()
         if self._found is not None:
@@ -59,7 +59,7 @@ class FirstLook:
         return check_evidence(evidence).warnings()
 
     def warnings(self) -> list[str]:
-        """A sentence on each fault that was found; none as long as nobody knows."""
+        """A sentence on each fault that was found; empty until the check is finished."""
         if self._found is None or not self._found.done():
             return []
         if (error := self._found.exception()) is not None:

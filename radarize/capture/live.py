@@ -1,4 +1,4 @@
-"""The pipeline on a stream, with a page that shows it."""
+"""Live pipeline on a stream, with a page that shows it."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -31,28 +31,28 @@ from radarize.slam.warmup import warm_up
 if TYPE_CHECKING:
     from radarize.evaluation.foxglove import Server
 
-#: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
-#: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
+#: Largest number of frames per batch. Libraries cache buffers for every batch size, the more the larger it is: up to
+#: this size `prepare` creates all of them, and memory then grows with the map alone.
 TOGETHER = 4
-#: s between pictures of a frame, and of the map; share of the time that the map is drawn at most, and s of pause after
-#: every node, which itself takes half a millisecond.
+#: s between pictures of a frame, and of the map; largest fraction of the time spent on drawing the map, and pause after
+#: every node, s, which itself takes half a millisecond.
 _FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE, _PAUSE = 0.2, 1.0, 0.25, 2e-3
 
 
 class Live:
-    """A pipeline that follows a stream.
+    """Live pipeline on a stream.
 
     Args:
-        inputs: what its methods are made from; see `prepare`.
+        inputs: inputs of its methods; see `prepare`.
         methods: odometry and scans by name.
-        page: shows it.
-        foxglove: shows it, too.
+        page: page that shows it.
+        foxglove: Foxglove server that shows it, too.
 
     Attributes:
-        losses: of the frames that came.
-        health: of the pipeline.
+        losses: lost frames and chirps.
+        health: health of the pipeline.
         first_look: check of the first seconds.
-        busy: s spent on the frames so far, showing them included.
+        busy: processing time of the frames so far, including display, s.
     """
 
     def __init__(
@@ -80,17 +80,17 @@ class Live:
         keeper: Keeper | None = None,
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> Iterator[tuple[np.ndarray, Result]]:
-        """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
+        """Process the stream until the user stops it, the number of frames is reached, or it ends; then finish the map.
 
         Args:
-            stream: an open one; stopped here.
-            stopping: set when the user wants to end.
-            frames: end after so many.
-            keeper: records the frames as well.
-            progress: called with frames done and wanted (0: until stopped).
+            stream: open stream; stopped here.
+            stopping: event that ends the processing.
+            frames: end after this number of frames.
+            keeper: recorder of the frames.
+            progress: called with frames done and total (0: until stopped).
 
         Yields:
-            frames that came together (`FrameRing.dtype`), and what the pipeline made of them, if it used any.
+            Frames received together (`FrameRing.dtype`), and the pipeline's result, if it used any.
 
         Raises:
             InputError: see `radarize.capture.stream.follow`.
@@ -122,7 +122,7 @@ class Live:
         self.page.send("end", {"troubles": self.troubles(stream)})
 
     def troubles(self, stream: FrameStream) -> list[str]:
-        """What is wrong with the stream and its recording so far, and where odometry had a hard time."""
+        """Warnings on the stream, its recording, and intervals of poor odometry, so far."""
         left_out = self._keeper.warnings() if self._keeper else []
         return [*stream.troubles(), *left_out, *self.first_look.warnings(), *self.health.warnings()]
 
@@ -152,7 +152,7 @@ class Live:
             self._show_map()
 
     def _show_map(self) -> None:
-        """Have the map as it is now drawn and sent in a thread: frames wait for nothing."""
+        """Draw and send the current map in a thread, without delaying frames."""
         slam = self.pipeline.slam
         self._drawn.result()
         now = list(slam.nodes), slam.graph.poses.copy(), int(slam.graph.accepted.sum()), self._stamp
@@ -170,9 +170,9 @@ class Live:
 
 
 def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
-    """Make a pipeline fast from its first frame on: another one runs on noise before, and SLAM, which noise does not
-    move, through a room of its own, so that whatever is compiled or loaded at first use is there."""
-    torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
+    """Warm up a pipeline so that it is fast from its first frame on: a copy processes noise, and SLAM, which noise does
+    not move, a synthetic room, so that everything is compiled and loaded."""
+    torch.set_num_threads(1)  # a frame is too small to parallelise: synchronisation costs more
     pipeline = make_pipeline(inputs, methods["odometry"], methods["scans"])
     preprocessor, radar = Preprocessor(inputs.signal), inputs.radar
     view, rng = LiveView(pipeline, inputs.signal), np.random.default_rng(0)

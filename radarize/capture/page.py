@@ -1,4 +1,4 @@
-"""A local web page that shows the newest state of things: one file, server-sent events, nothing from the network."""
+"""Local web page that shows the newest state of a session: one file, server-sent events, no external resources."""
 
 import contextlib
 import ipaddress
@@ -13,31 +13,31 @@ from urllib.parse import urlsplit
 from radarize.evaluation.report.page import STYLE
 from radarize.io.errors import InputError
 
-#: Events (HTML standard, section 9.2); a comment now and then tells whether the browser is still there.
+#: Events (HTML standard, section 9.2); a periodic comment detects whether the browser is still connected.
 _KEEP_ALIVE = 5.0
-#: Connections at a time: each browser holds one, and a second while it loads the page.
+#: Largest number of connections: each browser has one, and a second while it loads the page.
 _CLIENTS = 32
-#: What socketserver hands its methods.
+#: Request type of socketserver's methods.
 _Request = socket | tuple[bytes, socket]
 
 
 class Unwatched:
-    """Stands for a page that nobody asked for."""
+    """Placeholder for a page that is not requested."""
 
     watched = False
 
     def send(self, name: str, content: dict[str, object]) -> None:
-        """Nothing."""
+        """Discard the content."""
 
 
 class LivePage:
-    """Serves the page; use as a context manager.
+    """Server of the page; a context manager.
 
-    What is sent under a name replaces what was sent before: a browser that cannot keep up, or comes later, gets the
-    newest of every name, and nothing piles up.
+    Content replaces earlier content of the same name: a slow browser, or one that connects later, gets the
+    newest content of every name, and nothing accumulates.
 
     Args:
-        address: to listen on, ``HOST:PORT``; port 0 takes a free one.
+        address: address to listen on, ``HOST:PORT``; port 0 selects a free one.
 
     Attributes:
         url: to open in a browser.
@@ -70,15 +70,15 @@ class LivePage:
             self._closed = True
             self._changed.notify_all()
         self._server.shutdown()
-        self._server.server_close()  # waits until the browsers have the last events
+        self._server.server_close()  # waits until the last events are sent
 
     @property
     def watched(self) -> bool:
-        """Whether a browser looks on."""
+        """Whether a browser is connected."""
         return self._watching > 0
 
     def send(self, name: str, content: dict[str, object]) -> None:
-        """Show new content (plain data) under a name."""
+        """Set new content (plain data) of a name."""
         data = json.dumps(content)
         with self._changed:
             self._count += 1
@@ -86,7 +86,7 @@ class LivePage:
             self._changed.notify_all()
 
     def follow(self, write: Callable[[bytes], object]) -> None:
-        """Write events as they come until the page closes; runs in a browser's thread."""
+        """Write events to a browser until the page closes; runs in the connection's thread."""
         seen = 0
         with self._changed:
             self._watching += 1
@@ -116,7 +116,7 @@ class _Server(ThreadingHTTPServer):
         super().__init__(address, handler)
 
     def process_request(self, request: _Request, client_address: object) -> None:
-        """Answer in a thread of its own, while there is room."""
+        """Answer in a separate thread, unless there are too many connections."""
         if self._room.acquire(blocking=False):
             super().process_request(request, client_address)
             return
@@ -127,19 +127,19 @@ class _Server(ThreadingHTTPServer):
         self.shutdown_request(request)
 
     def process_request_thread(self, request: _Request, client_address: object) -> None:
-        """Make room again when a connection ends."""
+        """Release the connection's slot when it ends."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._room.release()
 
     def handle_error(self, request: _Request, client_address: object) -> None:
-        """A browser that went away is no error."""
+        """Ignore disconnected browsers."""
 
 
 class _Handler(BaseHTTPRequestHandler):
     server: _Server
-    timeout = 10.0  # a browser that takes nothing is let go
+    timeout = 10.0  # disconnects a browser that does not read
 
     def do_GET(self) -> None:
         if not self._ours():
@@ -155,8 +155,8 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_error(404)
 
     def _ours(self) -> bool:
-        """Whether the user's browser asks for this very page: by address, or a name that nobody else can point here
-        (DNS rebinding), and not on behalf of another site."""
+        """Whether the request is for this page: by address, or by a local name (against DNS rebinding), and not from
+        another site."""
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
         try:
             name = urlsplit(f"//{host}").hostname or ""
@@ -172,4 +172,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, *_: object) -> None:
-        """The terminal is for the user's own."""
+        """Keep the terminal free of the server's log."""

@@ -1,4 +1,4 @@
-"""Data packets of a DCA1000 from the network, put together to frames."""
+"""Reception of a DCA1000's data packets from the network, and assembly of frames."""
 
 import math
 import socket
@@ -12,31 +12,31 @@ from radarize.radar.assembler import FrameAssembler, PacketCounts
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import HEADER, MAX_PAYLOAD, decode
 
-#: Asked for, bytes: half a second at the DCA1000's fastest.
+#: Requested buffer size, bytes: half a second at the DCA1000's highest rate.
 SOCKET_BUFFER = 64 << 20
-#: Ports of the board's address that are listened to until packets of one agree.
+#: Largest number of the board's ports observed until packets of one agree.
 _PORTS = 16
-#: s, and share of the time, by which a radar may seem to be ahead of this computer's clock.
+#: Tolerance of the radar's clock relative to this computer's: s, and fraction of the time.
 _AHEAD, _DRIFT = 2.0, 1e-3
-#: Packets between two looks at whether to stop.
+#: Number of packets between checks for a stop.
 _BLOCK = 64
-#: s after which a receiver that was stopped ends though packets still come: they are a stranger's.
+#: s after which a stopped receiver ends even if packets still arrive: they are from another sender.
 _REST = 5.0
 
 
 def enlarge(receiver: socket.socket) -> int:
-    """Raise a socket's buffer as far as permitted; returns the bytes it holds."""
-    for option in (getattr(socket, "SO_RCVBUFFORCE", 33), socket.SO_RCVBUF):  # beyond the limit for root alone
+    """Enlarge a socket's buffer as far as permitted; return its size in bytes."""
+    for option in (getattr(socket, "SO_RCVBUFFORCE", 33), socket.SO_RCVBUF):  # beyond the limit, for root only
         try:
             receiver.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
             break
         except OSError:
             continue
-    return receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux reports twice what it was asked for
+    return receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux reports twice the requested size
 
 
 def buffer_warning(size: int, config: RadarConfig) -> list[str]:
-    """A sentence if a socket's buffer holds less than a quarter of a second of samples."""
+    """Warning if a socket's buffer holds less than a quarter of a second of samples."""
     wanted = int(0.25 * config.frame_bytes * config.frame_rate)
     if size >= wanted:
         return []
@@ -47,12 +47,12 @@ def buffer_warning(size: int, config: RadarConfig) -> list[str]:
 
 
 class Origin:
-    """Frames from the one port of an address whose packets make a stream; those of others are counted.
+    """Assemble frames from the port of a board's address whose packets form a stream; count those of other ports.
 
-    A board sends from one port, which nobody knows beforehand: the first one of which several packets agree.
+    A board sends from one port, unknown in advance: the first one of which several packets agree.
 
     Args:
-        address: of the board.
+        address: address of the board.
     """
 
     def __init__(self, address: str, config: RadarConfig):
@@ -64,7 +64,7 @@ class Origin:
         self.foreign = 0
 
     def take(self, sender: tuple[str, int], data: bytes | memoryview) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """As `FrameAssembler.take`, of what came from a sender."""
+        """Process a packet of a sender; see `FrameAssembler.take`."""
         address, port = sender
         if address != self._address or self._port not in (None, port):
             self.foreign += 1
@@ -84,17 +84,17 @@ class Origin:
         self.foreign += self._known.pop(port).counts.packets
 
     def look(self) -> PacketCounts:
-        """Note the time, beyond which no byte count can be; what became of the packets so far."""
+        """Update the limit of byte counts from the time, and return statistics of the packets so far."""
         if self._port is None:
             return PacketCounts()
         assembler = self._known[self._port]
         passed = (1 + _DRIFT) * (time.monotonic() - self._since) + _AHEAD
-        if assembler.begun is not None:  # else nothing but damaged packets came
+        if assembler.begun is not None:  # otherwise only damaged packets arrived
             assembler.furthest = assembler.begun + self._rate * passed
         return assembler.counts
 
     def finish(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Nothing will come any more: the frames left."""
+        """Yield the remaining frames at the end of the stream."""
         if self._port is None and self._known:
             self._port = max(self._known, key=lambda port: self._known[port].waiting)
         if self._port is not None:
@@ -102,8 +102,8 @@ class Origin:
 
 
 def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarConfig) -> None:
-    """A `Source`: frames from packets that `sender` sends to a bound socket, until stopped and what was on its way has
-    come."""
+    """A `Source`: frames from packets that `sender` sends to a bound socket, until stopped and all packets in transit
+    have arrived."""
     origin = Origin(sender, config)
     receiver.settimeout(GLANCE)
     buffer = bytearray(HEADER.size + MAX_PAYLOAD + 1)

@@ -1,4 +1,4 @@
-"""Recording a stream, whatever ends it."""
+"""Recording of a stream to a file, which stays whole however the stream ends."""
 
 import sys
 import time
@@ -15,17 +15,17 @@ from radarize.capture.stream import FrameStream, follow
 from radarize.io.errors import DiskFull, InputError, first_line
 from radarize.io.recording import RecordingWriter
 
-#: Frames written at once, at most.
+#: Largest number of frames written at once.
 _BATCH = 16
-#: s that a recording waits for a disk that is full, before it ends.
+#: s that a recording waits for space on a full disk before it ends.
 PATIENCE = 60.0
 
 
 class Keeper:
-    """Appends frames to a recording. Those that come while the disk is full are left out.
+    """Append frames to a recording; frames that arrive while the disk is full are left out.
 
     Attributes:
-        left_out: frames so far.
+        left_out: number of frames left out.
     """
 
     def __init__(self, writer: RecordingWriter):
@@ -38,7 +38,7 @@ class Keeper:
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"],
     ) -> None:
-        """Append frames, or leave them out.
+        """Append frames, or leave them out if the disk is full.
 
         Raises:
             InputError: they cannot be appended, or the disk has been full for too long.
@@ -57,22 +57,22 @@ class Keeper:
         self.left_out += len(stamps) - (self.writer.losses.frames - appended)
 
     def warnings(self) -> list[str]:
-        """One sentence, or none if nothing was left out."""
+        """A warning if frames were left out."""
         return [f"{self.left_out} frames are left out, since the disk was full"] if self.left_out else []
 
 
 @contextmanager
 def recording(stream: FrameStream, output: Path, overwrite: bool = False) -> Iterator[Keeper]:
-    """A keeper of a stream's frames. Whatever ends it, the recording is whole under its own name; where the disk does
-    not permit that, what is left is named, and how to rescue it.
+    """Open a recording of a stream's frames. However it ends, the recording is completed under its own name; if the
+    disk does not permit that, the error names the partial file and how to recover it.
 
     Args:
-        stream: an open one.
+        stream: open stream.
         output: recording to write.
-        overwrite: replace one that came from a radar.
+        overwrite: replace an existing recording of a radar.
 
     Raises:
-        InputError: it cannot be written; or of whatever went wrong, with the frames that are kept.
+        InputError: the file cannot be written, or any later error, with the number of frames that are kept.
     """
     writer = RecordingWriter(output, stream.config, cfg_text=stream.text, attributes=stream.facts, overwrite=overwrite)
     keeper = Keeper(writer)
@@ -110,22 +110,22 @@ def record(
     overwrite: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write a stream's frames to a recording until the user stops it, there are enough, or nothing comes any more.
+    """Record a stream until the user stops it, the number of frames is reached, or no more frames arrive.
 
-    Lost samples are zero and marked; frames for which the disk is too slow, or full for a while, are left out. Stamps
-    are those of the radar's clock, from 0 on, whatever was lost. What the user should know is joined in the
-    recording's attribute ``warnings``.
+    Lost samples are zero and marked; frames for which the disk is too slow, or temporarily full, are left out. Time
+    stamps are those of the radar's clock, from 0 on, whatever was lost. The recording's attribute ``warnings`` contains
+    the warnings.
 
     Args:
-        stream: an open one; stopped here.
-        output: recording to write; it is there, and whole, if a frame came.
-        stopping: set when the user wants to end.
-        frames: end after so many.
-        overwrite: replace a recording that came from a radar.
-        progress: called with frames done and wanted (0: until stopped).
+        stream: open stream; stopped here.
+        output: recording to write; it exists, and is whole, if a frame was received.
+        stopping: event that ends the recording.
+        frames: end after this number of frames.
+        overwrite: replace an existing recording of a radar.
+        progress: called with frames done and total (0: until stopped).
 
     Raises:
-        InputError: nothing came, or something went wrong, with what is kept; see `recording`.
+        InputError: no frame was received, or another error, with what is kept; see `recording`.
     """
     batches = follow(stream, stopping, most=_BATCH, frames=frames)
     if (first := next(batches, None)) is None:

@@ -1,4 +1,4 @@
-"""A recording played as it was captured: each frame when its burst has ended."""
+"""Replay of a recording in real time: each frame at the end of its burst."""
 
 import time
 from pathlib import Path
@@ -10,12 +10,12 @@ from radarize.radar.assembler import PacketCounts
 
 
 class Replay(FrameStream):
-    """A recording as a stream.
+    """Stream of a recording's frames.
 
     Args:
-        path: of the recording.
-        speed: how many times as fast as it was captured.
-        slots: frames that may wait.
+        path: path of the recording.
+        speed: playback speed relative to real time.
+        slots: number of frames that may wait.
 
     Raises:
         InputError: not a recording, or one without frames or samples.
@@ -32,12 +32,12 @@ class Replay(FrameStream):
 
     @property
     def facts(self) -> dict[str, object]:
-        """What a recording should say about its origin."""
+        """Attributes on the origin, for a recording."""
         return {"source": self.path.name}
 
 
 def replay(outlet: Outlet, path: Path, speed: float) -> None:
-    """A `Source`: the frames of a recording at its own pace, or `speed` times as fast."""
+    """A `Source`: the frames of a recording in real time, or `speed` times as fast."""
     packets = PacketCounts()
     with Recording(path) as recording:
         outlet.ready()

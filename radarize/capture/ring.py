@@ -1,4 +1,4 @@
-"""Frames on their way from one process to another, through shared memory that neither copies nor grows."""
+"""Ring buffer of frames between two processes in shared memory, of fixed size and without copies."""
 
 from multiprocessing import get_context
 
@@ -6,22 +6,22 @@ import numpy as np
 
 from radarize.radar.config import RadarConfig
 
-#: Processes start anew: a fork would copy the threads' locks.
+#: Processes are spawned: a fork would copy locks of the threads.
 CONTEXT = get_context("spawn")
-#: `number` of the slot that says that nothing follows.
+#: `number` of the slot that marks the end.
 _END = -1
 
 
 class FrameRing:
-    """A bounded queue of frames from one writer to one reader. The writer never waits: a frame that finds no free slot
-    is dropped whole.
+    """Bounded queue of frames from one writer to one reader. The writer never waits: a frame without a free slot
+    is dropped.
 
     Args:
-        slots: frames that may wait.
+        slots: number of frames that may wait.
 
     Attributes:
-        dtype: of a frame: ``number`` (from 0, lost and dropped frames counted), ``time`` (s), ``valid`` (loop, tx) and
-            ``adc`` (loop, tx, rx, sample, iq).
+        dtype: fields of a frame: ``number`` (from 0, lost and dropped frames counted), ``time`` (s), ``valid`` (loop,
+            tx) and ``adc`` (loop, tx, rx, sample, iq).
     """
 
     def __init__(self, config: RadarConfig, slots: int):
@@ -39,14 +39,14 @@ class FrameRing:
         self._written = self._taken = 0  # each counted by one of the two processes, in its own copy
 
     def put(self, number: int, time: float, adc: np.ndarray, valid: np.ndarray) -> bool:
-        """Add a frame; False if there was no room for it."""
+        """Add a frame; return False if there was no free slot."""
         if not self._free.acquire(block=False):
             return False
         self._write(number, time, adc, valid)
         return True
 
     def end(self, patience: float) -> bool:
-        """Say that nothing follows; False if no slot became free for `patience` seconds."""
+        """Mark the end of the stream; return False if no slot became free for `patience` seconds."""
         if not self._free.acquire(timeout=patience):
             return False
         self._write(_END, np.inf, 0, False)
@@ -59,20 +59,20 @@ class FrameRing:
         self._filled.release()
 
     def get(self, most: int, patience: float) -> np.ndarray | None:
-        """The frames that wait, oldest first.
+        """Return the waiting frames, oldest first.
 
         Args:
-            most: take no more than so many.
-            patience: s, how long to wait for the first.
+            most: maximum number of frames.
+            patience: s, timeout of the first frame.
 
         Returns:
-            (frame,) of `dtype`, empty if none came; None after the last one.
+            (frame,) of `dtype`, empty if none arrived; None after the last one.
         """
         found, count = np.empty(most, self.dtype), 0
         while count < most and self._filled.acquire(timeout=0 if count else patience):
             slot = self._slots[self._taken % self.slots]
             if slot["number"] == _END:
-                self._filled.release()  # the end stays the end
+                self._filled.release()  # later calls get the end as well
                 if not count:
                     return None
                 break

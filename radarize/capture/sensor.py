@@ -1,4 +1,4 @@
-"""A real sensor: a radar on its serial port, a DCA1000 on the network, and the order in which to tell them things."""
+"""Real sensor: a radar on its serial port and a DCA1000 on the network, controlled in the correct order."""
 
 import contextlib
 import socket
@@ -16,29 +16,29 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000_commands import Status
 from radarize.radar.limits import check_limits
 
-#: s: the board holds the end of the last frame back for 2 s, in the hope of filling a packet.
+#: s: the board holds the end of the last frame back for 2 s to fill a packet.
 _LAST_PACKET = 3.0
 
 
 class Sensor(FrameStream):
-    """A radar that streams from entering the context on, and is stopped on leaving it.
+    """Radar that streams from entering the context until leaving it.
 
     Args:
-        text: it was read from.
-        name: what errors call it.
-        port: the radar's serial command port.
-        baud: of its firmware.
+        text: text that the configuration was read from.
+        name: name in error messages.
+        port: serial command port of the radar.
+        baud: baud rate of its firmware.
         network: addresses and ports of the DCA1000.
-        slots: frames that may wait.
+        slots: number of frames that may wait.
 
     Attributes:
-        port: the radar's.
-        text: what the radar is sent.
-        version: of the board's firmware, once entered.
+        port: port of the radar.
+        text: commands sent to the radar.
+        version: firmware version of the board, once entered.
 
     Raises:
-        InputError: the radar cannot do the configuration, or streams no samples with it; ports cannot be opened. On
-            entering: what radar or board refuse.
+        InputError: the chip cannot use the configuration, or it does not stream samples; ports cannot be opened. On
+            entering: an error of radar or board.
     """
 
     def __init__(
@@ -66,13 +66,13 @@ class Sensor(FrameStream):
 
     def __enter__(self) -> "Sensor":
         try:
-            self._uart.configure(self.text)  # stops a radar that still runs
+            self._uart.configure(self.text)  # stops a running radar
             self.version = self._board.configure(self.config)
             _drain(self._receiver)
             super().__enter__()
             self._board.start()
             self._running = True
-            self._uart.start()  # only now: whatever comes before the board records is lost
+            self._uart.start()  # last, because samples before the board records are lost
         except BaseException:
             self.__exit__()
             raise
@@ -84,7 +84,7 @@ class Sensor(FrameStream):
         self._open.close()
 
     def stop(self) -> None:
-        """Stop the radar at the end of a frame, and wait until the board has sent all of it."""
+        """Stop the radar at the end of a frame, and wait until the board has sent everything."""
         self._halt(self._uart.stop, self._rest, self._board.stop)
         super().stop()
 
@@ -95,7 +95,7 @@ class Sensor(FrameStream):
         for step in steps:
             try:
                 step()
-            except InputError as error:  # unplugged, perhaps; what was received is to be kept all the same
+            except InputError as error:  # perhaps unplugged; received frames must be kept
                 self._notes.append(str(error))
 
     def _rest(self) -> None:
@@ -105,14 +105,14 @@ class Sensor(FrameStream):
 
     @property
     def facts(self) -> dict[str, object]:
-        """What a recording should say about its origin."""
+        """Attributes on the origin, for a recording."""
         return {"source": f"{FROM_RADAR}{self.port}, DCA1000 at {self._board.network.dca}"}
 
     def silent(self, seconds: float, at_all: bool) -> None:
-        """Why nothing comes.
+        """Warn about the reason that no frames arrive.
 
         Raises:
-            InputError: nothing ever came.
+            InputError: no frame has ever arrived.
         """
         network, foreign = self._board.network, self.counts.foreign
         where = f"at {network.host}, UDP port {network.data_port}"
@@ -132,13 +132,13 @@ class Sensor(FrameStream):
         self._notes.append(message)
 
     def troubles(self) -> list[str]:
-        """What the user should know about radar, board and stream so far."""
+        """Warnings on radar, board and stream so far."""
         ignored = [f"the radar does not know {command!r}, which is not needed" for command in self._uart.ignored]
         return [*self._notes, *ignored, *self._board.troubles(), *super().troubles()]
 
 
 def _drain(receiver: socket.socket) -> None:
-    """Throw away what an earlier capture left in the socket."""
+    """Discard packets of an earlier capture in the socket."""
     receiver.setblocking(False)
     with contextlib.suppress(OSError):
         while True:

@@ -1,4 +1,4 @@
-"""Frames from a process of their own, so that nothing the main one does makes it miss a packet."""
+"""Stream of frames from a separate process, so that no packet is missed while the main process works."""
 
 import contextlib
 import signal
@@ -19,21 +19,21 @@ from radarize.io.errors import InputError
 from radarize.radar.assembler import PacketCounts
 from radarize.radar.config import RadarConfig
 
-#: s, how often a waiting process looks whether it should end.
+#: s between checks of a waiting process whether to end.
 GLANCE = 0.2
-#: s without a frame after which a stream is taken to have ended.
+#: s without a frame after which a stream is considered ended.
 SILENCE = 5.0
-#: s for a process to start: it imports numpy and pydantic, on a machine that may be busy.
+#: s for a process to start, with imports of numpy and pydantic on a busy machine.
 _START_PATIENCE = 60.0
 
 
 @dataclass
 class StreamCounts:
-    """What a stream has done so far.
+    """Counts of a stream.
 
     Attributes:
-        frames: that came, lost ones included.
-        dropped: of these, that found no room because the reader was too slow.
+        frames: number of frames, lost ones included.
+        dropped: number of these that were dropped because the reader was too slow.
         foreign: packets from other senders.
         first: s since 1970, arrival of the first packet; 0 before.
     """
@@ -48,59 +48,60 @@ _Counts = TypeVar("_Counts", StreamCounts, PacketCounts)
 
 
 class Outlet:
-    """The filling process's end of a stream: what a source (`Source`) writes to."""
+    """Writer's end of a stream, used by a source (`Source`)."""
 
     def __init__(self, ring: FrameRing, stop: Flag, ready: Flag, shared: Array[c_double]):
         self.ring, self._stop, self._ready, self._shared = ring, stop, ready, shared
         self.counts = StreamCounts()
 
     def ready(self) -> None:
-        """The source is listening."""
+        """Signal that the source is listening."""
         self._ready.set()
 
     def put(self, time: float, adc: np.ndarray, valid: np.ndarray) -> None:
-        """Hand a frame on, or drop and count it."""
+        """Pass on a frame, or drop and count it."""
         self.counts.dropped += not self.ring.put(self.counts.frames, time, adc, valid)
         self.counts.frames += 1
 
     def publish(self, packets: PacketCounts) -> None:
-        """Let the reader see the counts."""
+        """Publish the packet counts to the reader."""
         self._shared[:] = [*astuple(self.counts), *astuple(packets)]
 
     @property
     def stopped(self) -> bool:
-        """Whether to end when nothing more comes: the reader said so."""
+        """Whether the reader has asked to end when no more frames arrive."""
         return self._stop.is_set() or self.orphaned
 
     @property
     def orphaned(self) -> bool:
-        """Whether the reader is gone."""
+        """Whether the reader's process has ended."""
         reader = parent_process()
         assert reader is not None  # this is the filling process
         return not reader.is_alive()
 
 
-#: Fills an outlet until it is stopped or has no more; runs in the stream's process, so it must be a module's function.
+#: Function that writes to an outlet until it is stopped or finished; runs in another process, so it must be at module
+#: level.
 Source = Callable[..., None]
 
 
 class FrameStream:
-    """Frames that a source puts out in a process of its own; use as a context manager.
+    """Stream of frames from a source in a separate process; a context manager.
 
     Args:
         source: see `Source`; called with an `Outlet` and `arguments`.
         arguments: picklable.
-        slots: frames that may wait before whole ones are dropped.
+        slots: number of frames that may wait before frames are dropped.
 
     Attributes:
-        text: of the configuration.
+        text: text of the configuration.
     """
 
     text = ""
 
     @property
     def facts(self) -> dict[str, object]:
-        """What a recording should say about its origin."""
+        """Attributes on the origin, for a recording."""
         return {}
 
     def __init__(self, config: RadarConfig, source: Source, *arguments: object, slots: int = 64):
@@ -131,11 +132,11 @@ class FrameStream:
             self._process.join()
 
     def stop(self) -> None:
-        """Ask the source to end; what is on its way can still be read."""
+        """Ask the source to end; frames in transit can still be read."""
         self._stop.set()
 
     def frames(self, most: int, patience: float = GLANCE) -> np.ndarray | None:
-        """The frames that wait, see `FrameRing.get`; None after the last one.
+        """Return the waiting frames, see `FrameRing.get`; None after the last one.
 
         Raises:
             InputError: the source failed.
@@ -151,7 +152,7 @@ class FrameStream:
         return None
 
     def troubles(self) -> list[str]:
-        """What the user should know about the stream so far."""
+        """Warnings on the stream so far."""
         counts = self.counts
         found = []
         if counts.dropped:
@@ -161,16 +162,16 @@ class FrameStream:
         return found + self.packets.warnings()
 
     def silent(self, seconds: float, at_all: bool) -> None:
-        """Nothing came for a while, or nothing at all: note why, or raise InputError."""
+        """Handle the absence of frames: store the reason, or raise InputError."""
 
     @property
     def counts(self) -> StreamCounts:
-        """Frames so far."""
+        """Counts of frames so far."""
         return _read(StreamCounts, self._counts[: len(fields(StreamCounts))])
 
     @property
     def packets(self) -> PacketCounts:
-        """Packets so far."""
+        """Counts of packets so far."""
         return _read(PacketCounts, self._counts[len(fields(StreamCounts)) :])
 
 
@@ -181,7 +182,7 @@ def _read(kind: type[_Counts], values: list[float]) -> _Counts:
 
 
 def _fill(source: Source, arguments: tuple, shared: tuple, failure: Connection) -> None:
-    # A terminal's signals come here, too; but the main process ends this one, when everything has been received.
+    # The terminal's signals reach this process, too, but the main process ends it after everything has been received.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     outlet = Outlet(*shared)
@@ -194,16 +195,16 @@ def _fill(source: Source, arguments: tuple, shared: tuple, failure: Connection) 
 
 
 def follow(stream: FrameStream, stopping: Event, *, most: int, frames: int | None = None) -> Iterator[np.ndarray]:
-    """Batches of frames of `FrameRing.dtype`, until the stream ends, the user stops it, or there are enough.
+    """Yield batches of frames of `FrameRing.dtype`, until the stream ends, the user stops it, or the count is reached.
 
     Args:
-        stream: an open one; stopped here.
-        stopping: set when the user wants to end; what is on its way is still given out.
-        most: frames in a batch.
-        frames: end before the frame of this number.
+        stream: open stream; stopped here.
+        stopping: event that ends the stream; frames in transit are still yielded.
+        most: maximum number of frames in a batch.
+        frames: end before the frame with this number.
 
     Raises:
-        InputError: no frame at all came, or the source failed.
+        InputError: no frame was received, or the source failed.
     """
     stopped, last, number, came = False, time.monotonic(), -1, 0
     patience = SILENCE + 2 * stream.config.frame_period
@@ -213,8 +214,8 @@ def follow(stream: FrameStream, stopping: Event, *, most: int, frames: int | Non
             wanted = found if frames is None else found[found["number"] < frames]
             if len(wanted):
                 yield wanted
-            last = time.monotonic()  # after what the reader did, however long that took
-        if (received := stream.packets.received) > came:  # a frame may take long
+            last = time.monotonic()  # without the time taken by the reader
+        if (received := stream.packets.received) > came:  # a frame may be long
             came, last = received, time.monotonic()
         silent = time.monotonic() - last > patience
         enough = frames is not None and number >= frames - 1

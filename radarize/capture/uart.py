@@ -1,7 +1,7 @@
-"""The radar's command line over UART: TI's `mmwDemo` firmware, 115200 baud, prompt ``mmwDemo:/>``.
+"""Radar's command line over UART: TI's `mmwDemo` firmware, 115200 baud, prompt ``mmwDemo:/>``.
 
-Every command is answered by ``Done``, or by ``Error ...`` and words of the firmware's own (mmWave SDK user guide,
-"Configuration (.cfg) file format").
+Every command is answered by ``Done``, or by ``Error ...`` and a message (mmWave SDK user guide, "Configuration (.cfg)
+file format").
 """
 
 import errno
@@ -17,26 +17,26 @@ from radarize.radar.config import RadarConfig
 
 BAUD = 115200
 PROMPT = "mmwDemo:/>"
-#: s without an answer; sensorStop answers when the frame has ended, sensorStart when the RF is calibrated.
+#: Timeouts, s; sensorStop answers at the end of the frame, sensorStart after RF calibration.
 _PATIENCE, _START_PATIENCE = 3.0, 10.0
-#: Refused by some firmware, and not needed.
+#: Commands that are not needed and unknown to some firmware.
 _OPTIONAL = ("calibData",)
-#: What a port that is gone raises; termios's own is no OSError.
+#: Errors of a disconnected port; termios's own is no OSError.
 _LOST = (serial.SerialException, OSError, termios.error)
 
 
 class Uart:
-    """A radar's command port; use as a context manager.
+    """Command port of a radar; a context manager.
 
     Args:
         port: serial device, e.g. ``/dev/ttyACM0``.
-        baud: of the firmware.
+        baud: baud rate of the firmware.
 
     Attributes:
-        ignored: commands that the firmware does not know and that are not needed.
+        ignored: commands that are unknown to the firmware and not needed.
 
     Raises:
-        InputError: the port cannot be opened, with the reason and what to do.
+        InputError: the port cannot be opened, with the reason and the remedy.
     """
 
     def __init__(self, port: str, baud: int = BAUD):
@@ -54,22 +54,22 @@ class Uart:
         self._serial.close()
 
     def configure(self, text: str) -> None:
-        """Send a configuration, from sensorStop to all but sensorStart.
+        """Send a configuration, from sensorStop up to, but without, sensorStart.
 
         Args:
-            text: commands, one a line; comments are left out.
+            text: commands, one per line; comments are skipped.
 
         Raises:
-            InputError: the radar refuses a command (with its words), or does not answer.
+            InputError: the radar rejects a command (with its message), or does not answer.
         """
         for command in commands(text):
             self.send(command)
 
     def start(self) -> None:
-        """Begin to transmit.
+        """Start to transmit.
 
         Raises:
-            InputError: as `configure`.
+            InputError: see `configure`.
         """
         self.send("sensorStart", _START_PATIENCE)
 
@@ -77,15 +77,15 @@ class Uart:
         """Stop at the end of the frame.
 
         Raises:
-            InputError: as `configure`.
+            InputError: see `configure`.
         """
         self.send("sensorStop")
 
     def send(self, command: str, patience: float = _PATIENCE) -> str:
-        """Send a command, one line, and wait for its answer (s): what the radar said, without echo and prompt.
+        """Send a command, one line, and return the radar's answer, without echo and prompt; `patience`: timeout, s.
 
         Raises:
-            InputError: it refused, said something unreadable, or nothing.
+            InputError: an error message, an unreadable answer, or none.
         """
         try:
             self._serial.reset_input_buffer()
@@ -99,14 +99,14 @@ class Uart:
                 f"--baud {self.baud} is wrong, or this is the data port"
             )
         lines = [line.strip() for line in heard.decode("ascii").replace(PROMPT, "\n").splitlines()]
-        said = [line for line in lines if line and line != command]
-        if "Done" in said:
-            return "\n".join(line for line in said if line != "Done")
-        if said and command.split()[0] in _OPTIONAL:
+        answer = [line for line in lines if line and line != command]
+        if "Done" in answer:
+            return "\n".join(line for line in answer if line != "Done")
+        if answer and command.split()[0] in _OPTIONAL:
             self.ignored.append(command)
             return ""
-        if said:
-            raise InputError(f"--port {self.port}: the radar refuses {command!r}: {' '.join(said)}")
+        if answer:
+            raise InputError(f"--port {self.port}: the radar refuses {command!r}: {' '.join(answer)}")
         raise InputError(
             f"--port {self.port}: no answer to {command!r} within {patience:g} s, expected a radar with the mmWave SDK "
             "demo; is it powered, in functional mode (SOP jumpers) and reset, and is this its command port (the first "
@@ -114,7 +114,7 @@ class Uart:
         )
 
     def _listen(self, patience: float) -> bytes:
-        """Everything until the prompt that follows an answer."""
+        """Read until the prompt after an answer."""
         heard, deadline = bytearray(), time.monotonic() + patience
         while time.monotonic() < deadline:
             heard += self._serial.read(max(1, self._serial.in_waiting))
@@ -123,19 +123,19 @@ class Uart:
         return bytes(heard)
 
 
-#: What ends an answer: success, failure, and a command that the firmware does not know.
+#: Ends of an answer: success, failure, or unknown command.
 _FINAL = (b"Done", b"Error", b"not recognized")
 
 
 def commands(text: str) -> list[str]:
-    """Commands of a configuration as the radar wants them: sensorStop and flushCfg first, sensorStart left out."""
+    """Commands of a configuration in the required order: sensorStop and flushCfg first, without sensorStart."""
     lines = [" ".join(line.split("%")[0].split()) for line in text.splitlines()]
     rest = [line for line in lines if line and line.split()[0] not in ("sensorStop", "flushCfg", "sensorStart")]
     return ["sensorStop", "flushCfg", *rest]
 
 
 def text_for(config: RadarConfig, text: str, name: str) -> str:
-    """The configuration as commands: its own text if it is a .cfg, else written anew.
+    """Commands of a configuration: its own text if it is a .cfg, otherwise written from its fields.
 
     Raises:
         InputError: it does not stream samples over LVDS.
@@ -150,7 +150,7 @@ def text_for(config: RadarConfig, text: str, name: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Why a port cannot be opened, and what to do."""
+    """Reason why a port cannot be opened, and the remedy."""
     number = getattr(error, "errno", None)
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
         there = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"

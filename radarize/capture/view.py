@@ -1,4 +1,4 @@
-"""What a running pipeline looks like: heat maps of the newest frame, map and path so far, and how busy it is."""
+"""Live view of a pipeline: heat maps of the newest frame, map and path so far, and processing load."""
 
 import base64
 import io
@@ -17,13 +17,13 @@ from radarize.signal.batch import Signal
 from radarize.signal.heatmaps import Heatmaps
 from radarize.slam.grid import OccupancyGrid
 
-#: Pixels across the fan, and s over which figures are averaged.
+#: Width of the fan in pixels, and averaging time of figures, s.
 _FAN, _SPAN = 260, 2.0
 _COLORS = (255 * matplotlib.colormaps["magma"](np.linspace(0, 1, 256))).astype(np.uint8)
 
 
 class Fan:
-    """Range-azimuth maps from above: forward is up, left is left."""
+    """Range-azimuth maps in plan view: forward is up, left is left."""
 
     def __init__(self, heatmaps: Heatmaps):
         reach, edge = heatmaps.ranges[-1], abs(heatmaps.azimuths).max()
@@ -63,7 +63,7 @@ class LiveView:
     """Pictures and figures of a pipeline, as plain data for a page.
 
     Attributes:
-        newest: what the last batch with frames gave.
+        newest: result of the last batch with frames.
     """
 
     def __init__(self, pipeline: Pipeline, signal: Signal):
@@ -74,13 +74,13 @@ class LiveView:
         self._history: deque[tuple[float, int, dict[str, float]]] = deque()  # clock, frames, seconds by stage
 
     def add(self, result: Result) -> None:
-        """Take what a batch gave: the sink of a live pipeline."""
+        """Store the result of a batch; the sink of a live pipeline."""
         if len(result.frames):
             self.newest = result
             self._frames += len(result.frames)
 
     def facts(self) -> dict[str, object]:
-        """What does not change: axes of the heat maps, the budget."""
+        """Constant data: axes of the heat maps, time budget."""
         config, maps = self._heatmaps.config, self._heatmaps
         return {
             "budget_ms": 1e3 * config.frame_period,
@@ -94,12 +94,12 @@ class LiveView:
         doppler = self._heatmaps.doppler_azimuth_of(spectrum)[0].numpy()
         return {
             "fan": self._fan.draw(self._heatmaps.range_azimuth_of(spectrum)[0].numpy()),
-            # Closing speeds up, left to the left.
+            # Closing speeds upwards, left to the left.
             "doppler": np.kron(colored(doppler)[::-1, ::-1], np.ones((5, 1, 1), np.uint8)),
         }
 
     def frame(self, pictures: dict[str, np.ndarray], stamp: float) -> dict[str, object]:
-        """A frame's pictures, the pose, and the load."""
+        """Pictures of a frame, pose, and load."""
         pose = self.pose()
         shown = {name: png(pixels) for name, pixels in pictures.items()}
         place = None if pose is None else [round(float(value), 4) for value in pose]
@@ -107,7 +107,7 @@ class LiveView:
 
     @staticmethod
     def map(grid: OccupancyGrid, poses: Float[np.ndarray, "node 3"], loops: int) -> dict[str, object]:
-        """Map, path of the nodes, and how many loops are closed."""
+        """Map, path of the nodes, and number of closed loops."""
         chance = np.rint(255 * grid.probability[::-1] * grid.unit).astype(np.uint8)
         shade = 255 - chance
         colors = np.stack([shade, shade, shade, np.where(chance > 0, 255, 0).astype(np.uint8)], axis=-1)
@@ -121,7 +121,7 @@ class LiveView:
         }
 
     def pose(self) -> Float[np.ndarray, "3"] | None:
-        """Where the sensor is on the map: odometry since the last node, from that node on."""
+        """Pose of the sensor on the map: that of the last node, plus odometry since then."""
         slam = self._pipeline.slam
         if self.newest is None:
             return None
@@ -131,7 +131,7 @@ class LiveView:
         return now
 
     def _load(self) -> dict[str, object]:
-        """Frames a second and ms a frame by stage, over the last seconds."""
+        """Frames per second, and ms per frame by stage, over the last seconds."""
         now = time.monotonic(), self._frames, dict(self._pipeline.seconds)
         self._history.append(now)
         while len(self._history) > 2 and self._history[1][0] <= now[0] - _SPAN:

@@ -1,6 +1,6 @@
-"""`radarize`: the pipeline's command line. `radarize.cli` has the commands."""
+"""Command line `radarize`: importing this package registers all commands in `app`."""
 
-from radarize.cli import recordings, runs, studies  # noqa: F401  each enters its commands into `app`
+from radarize.cli import recordings, runs, studies  # noqa: F401  each registers its commands in `app`
 from radarize.cli.app import app
 from radarize.io.console import run
 

@@ -1,4 +1,4 @@
-"""``python -m radarize.cli``."""
+"""Run the command line as ``python -m radarize.cli``."""
 
 from radarize.cli import main
 

@@ -1,4 +1,4 @@
-"""The command line itself, options that several commands have, and how they speak to the user."""
+"""Application object of the command line, options shared by several commands, and their output of warnings."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,40 +10,44 @@ from radarize.io.plugins import Plugins
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
-RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
-RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
-Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
-RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
-BoardFile = Annotated[
-    Path | None, typer.Option(metavar="BOARD.yaml", help="The board with its calibration, see `radarize calibrate`.")
+RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording (HDF5).")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder, written by `radarize run`.")]
+Beside = Annotated[
+    list[Path] | None, typer.Option(help="Another run of the same recording to compare with; may be repeated.")
 ]
-PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
-Baud = Annotated[int, typer.Option(help="Of the command port.")]
-Host = Annotated[str, typer.Option(help="This computer's address, which the DCA1000 sends to.")]
-Dca = Annotated[str, typer.Option(help="The DCA1000's address.")]
-CommandPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the DCA1000's commands.")]
-DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of its samples.")]
-Duration = Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")]
-FrameCount = Annotated[int | None, typer.Option(min=1, help="End after so many frames.")]
+RadarFile = Annotated[str | None, typer.Option("--config", help="Radar configuration: a .cfg or the name of a preset.")]
+BoardFile = Annotated[
+    Path | None, typer.Option(metavar="BOARD.yaml", help="Board file with a calibration, see `radarize calibrate`.")
+]
+PortName = Annotated[str | None, typer.Option("--port", help="Serial command port of the radar.")]
+Baud = Annotated[int, typer.Option(help="Baud rate of the command port.")]
+Host = Annotated[str, typer.Option(help="IP address of this computer, to which the DCA1000 sends.")]
+Dca = Annotated[str, typer.Option(help="IP address of the DCA1000.")]
+CommandPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the DCA1000 for commands.")]
+DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port to which the DCA1000 sends samples.")]
+Duration = Annotated[float | None, typer.Option(min=0.0, help="Stop after this time, s.")]
+FrameCount = Annotated[int | None, typer.Option(min=1, help="Stop after this number of frames.")]
 Reading = Literal["corrected", "published"]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace a recording that came from a radar, or what was left of one.")
+    bool,
+    typer.Option("--overwrite", help="Replace an existing recording of a radar, or the rest of an interrupted one."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
 def names(group: str) -> str:
-    """Names of a group of entry points, for help."""
+    """Return the names in a group of entry points, separated by commas, for help texts."""
     return ", ".join(Plugins(group, group))
 
 
 def warn(warnings: list[str]) -> None:
-    for words in warnings:
-        typer.echo(f"warning: {words}", err=True)
+    """Print warnings to stderr."""
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
 
 
 def damage(source: Path) -> list[str]:
-    """Sentences on what of a recording is damaged, once all its samples have been unpacked; none of a run's folder."""
+    """Return a sentence on each damage of a recording, found by unpacking all its samples; empty for a run folder."""
     from radarize.io.load import load
 
     if source.is_dir():
@@ -53,8 +57,8 @@ def damage(source: Path) -> list[str]:
         return recording.damage
 
 
-def tell(written: Path) -> None:
-    """How many frames a new recording has, and what its attributes warn of."""
+def print_summary(written: Path) -> None:
+    """Print the number of frames of a new recording, and the warnings in its attributes."""
     from radarize.io.recording import Recording
 
     with Recording(written) as recording:

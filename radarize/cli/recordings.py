@@ -1,4 +1,4 @@
-"""Commands that make recordings, and say what they hold."""
+"""Commands that import, capture, repair, calibrate, describe and check recordings."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ from radarize.cli.app import (
     RadarFile,
     RecordingFile,
     app,
-    tell,
+    print_summary,
     warn,
 )
 from radarize.io.console import print_table, progress, until_interrupted, working
@@ -33,67 +33,79 @@ def import_(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A DCA1000 .bin, a .pcap or .pcapng, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its "
-            "folder), an array of samples (.npy, .npz, .mat), a sequence of I/Q-1M (roverd), or RadarHD's dataset_5.",
+            help="DCA1000 .bin, .pcap or .pcapng, folder of mmWave Studio, ROS bag (.bag, .mcap, .db3 or its folder), "
+            "array of samples (.npy, .npz, .mat), sequence of I/Q-1M (roverd), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
-    config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
-    poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
+    config: Annotated[
+        str | None, typer.Option(help="Radar configuration: a .cfg, a .mmwave.json or the name of a preset.")
+    ] = None,
+    poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM file).")] = None,
     shape: Annotated[
         str | None,
-        typer.Option(metavar="AXES", help="Of an array: frame, loop, tx, rx, sample in its order, or lengths."),
+        typer.Option(metavar="AXES", help="Axes of an array in order: frame, loop, tx, rx, sample; or their lengths."),
     ] = None,
-    variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
+    variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat file.")] = None,
     latency: Annotated[
         float | None,
         typer.Option(
-            help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
+            help="Time from the start of a frame to its receipt in a bag, s; default: from message headers, else "
+            "the burst duration."
         ),
     ] = None,
     imu_turn: Annotated[
-        str | None, typer.Option(metavar="'ROLL PITCH YAW'", help="Of a bag's IMU on the radar, degrees.")
+        str | None,
+        typer.Option(metavar="'ROLL PITCH YAW'", help="Orientation of a bag's IMU relative to the radar, degrees."),
     ] = None,
     capture: Annotated[
         int | None,
-        typer.Option(help="Which capture of a .pcap with several (boards, ports, starts of the radar); else all."),
+        typer.Option(help="Number of the capture in a .pcap that holds several (boards, ports, starts); default: all."),
     ] = None,
-    walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
+    walk: Annotated[int | None, typer.Option(help="Number of the walk in RadarHD's dataset_5.")] = None,
     align: Annotated[
-        bool, typer.Option("--align", help="Of a walk: the lidar's pictures of the same instants, not numbers.")
+        bool,
+        typer.Option(
+            "--align", help="Match radar and lidar images of RadarHD by time stamp instead of by frame index."
+        ),
     ] = False,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
-    rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
-    tx: Annotated[str | None, typer.Option(help="How many transmitters (3), or their firing order (1,3,2).")] = None,
-    iq_order: Annotated[Literal["iiqq", "qqii"] | None, typer.Option(help="mmWave Studio, or SDK demo.")] = None,
+    rx: Annotated[str | None, typer.Option(help="Number of receivers (4), or the enabled ones (1,3).")] = None,
+    tx: Annotated[str | None, typer.Option(help="Number of transmitters (3), or their firing order (1,3,2).")] = None,
+    iq_order: Annotated[
+        Literal["iiqq", "qqii"] | None, typer.Option(help="Order of I and Q: iiqq (mmWave Studio) or qqii (SDK demo).")
+    ] = None,
     encoding: Annotated[
-        Literal["signed", "offset-binary"], typer.Option(help="Of a .bin's words; a warning says where it looks other.")
+        Literal["signed", "offset-binary"],
+        typer.Option(help="Encoding of .bin words; a mismatch is reported as a warning."),
     ] = "signed",
     layout: Annotated[
         Literal["pairs", "interleaved", "real"],
         typer.Option(
             metavar="LAYOUT",
-            help="Of a .bin's words: pairs (I and Q), interleaved (receivers by turns, four lanes), or real samples.",
+            help="Order of .bin words: pairs (I and Q), interleaved (receivers alternate, 4 lanes), or real samples.",
         ),
     ] = "pairs",
-    board: Annotated[str | None, typer.Option(help="The board: iwr1843boost, ..., or its YAML file.")] = None,
-    start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
-    slope: Annotated[float | None, typer.Option(help="Hz/s (80 MHz/us is 80e12).")] = None,
-    sample_rate: Annotated[float | None, typer.Option(help="Hz.")] = None,
-    idle_time: Annotated[float | None, typer.Option(help="s.")] = None,
-    adc_start_time: Annotated[float | None, typer.Option(help="s.")] = None,
-    ramp_end_time: Annotated[float | None, typer.Option(help="s.")] = None,
-    frame_period: Annotated[float | None, typer.Option(help="s.")] = None,
-    start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
+    board: Annotated[str | None, typer.Option(help="Name of the board (iwr1843boost, ...) or its YAML file.")] = None,
+    start_frequency: Annotated[float | None, typer.Option(help="Start frequency of the chirp, Hz.")] = None,
+    slope: Annotated[float | None, typer.Option(help="Chirp slope, Hz/s (80 MHz/us is 80e12).")] = None,
+    sample_rate: Annotated[float | None, typer.Option(help="ADC sample rate, Hz.")] = None,
+    idle_time: Annotated[float | None, typer.Option(help="Idle time before each chirp, s.")] = None,
+    adc_start_time: Annotated[
+        float | None, typer.Option(help="Time from the start of the ramp to the first sample, s.")
+    ] = None,
+    ramp_end_time: Annotated[float | None, typer.Option(help="Duration of the ramp, s.")] = None,
+    frame_period: Annotated[float | None, typer.Option(help="Frame period, s.")] = None,
+    start_time: Annotated[float | None, typer.Option(help="Time stamp of the first frame, s.")] = None,
 ) -> None:
-    """Make a recording from a capture of a real radar."""
+    """Convert raw data of a real radar to a recording."""
     given = dict(locals())  # all options, by name
     from radarize.io.load import load
     from radarize.io.recording import keeping
 
     with keeping(output), progress("import") as report:
-        tell(load(**given, progress=report).path)
+        print_summary(load(**given, progress=report).path)
 
 
 @app.command()
@@ -110,7 +122,7 @@ def capture(
     frames: FrameCount = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Record a real radar: IWR1843BOOST with a DCA1000. Whatever ends it, Ctrl-C too, leaves a whole file."""
+    """Record a real radar: IWR1843BOOST with a DCA1000. The file is complete even if Ctrl-C ends the capture."""
     from radarize.capture.api import frames_within, sensor
     from radarize.capture.record import record
     from radarize.io.recording import spare
@@ -122,7 +134,7 @@ def capture(
     most = frames_within(duration, frames, radar.config.frame_period)
     with until_interrupted() as stopping, progress("capture") as report, radar:
         record(radar, output, stopping, frames=most, overwrite=overwrite, progress=report)
-    tell(output)
+    print_summary(output)
 
 
 @app.command()
@@ -130,7 +142,7 @@ def live(
     replay: Annotated[Path | None, typer.Option(metavar="REC.h5", help="Play a recording instead of a radar.")] = None,
     config: RadarFile = None,
     port: PortName = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Record as well (.h5).")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Also write a recording (.h5).")] = None,
     baud: Baud = 115200,
     host: Host = "192.168.33.30",
     dca: Dca = "192.168.33.180",
@@ -141,20 +153,24 @@ def live(
     odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     weights: Annotated[Path | None, typer.Option(help="See `radarize run`.")] = None,
-    pipeline: Annotated[
-        Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")
-    ] = None,
+    pipeline: Annotated[Path | None, typer.Option(help="Pipeline settings (YAML), see `radarize config`.")] = None,
     every: Annotated[
-        int | None, typer.Option(min=1, help="Follow every N-th frame; by default as the networks were trained.")
+        int | None,
+        typer.Option(min=1, help="Use every N-th frame; by default to match the frame rate of the networks."),
     ] = None,
-    address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
+    address: Annotated[
+        str, typer.Option(help="Address and port of the page; port 0 picks a free one.")
+    ] = "127.0.0.1:8470",
     foxglove: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Serve Foxglove as well, e.g. 127.0.0.1:8765.")
+        str | None, typer.Option(metavar="HOST:PORT", help="Also serve Foxglove, e.g. at 127.0.0.1:8765.")
     ] = None,
     overwrite: Overwrite = False,
     board: BoardFile = None,
 ) -> None:
-    """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
+    """Run the pipeline on a real radar, or on a recording in real time, and show the result on a local web page.
+
+    Ctrl-C ends it.
+    """
     given = dict(locals())  # all options, by name
     from radarize.capture.api import live
 
@@ -168,30 +184,30 @@ def live(
             for _ in session.frames(stopping, report):
                 pass
     warn(session.warnings)
-    followed = session.live.losses.frames
-    print(f"{followed} frames, {1e3 * session.live.busy / max(followed, 1):.1f} ms each")
+    frames = session.live.losses.frames
+    print(f"{frames} frames, {1e3 * session.live.busy / max(frames, 1):.1f} ms each")
 
 
 @app.command()
 def recover(
-    part: Annotated[Path, typer.Argument(metavar="REC.h5.part", help="What a program that was killed has left.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Recording to write; else REC.h5.")] = None,
+    part: Annotated[Path, typer.Argument(metavar="REC.h5.part", help="File that an interrupted program left.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Recording to write; default: REC.h5.")] = None,
 ) -> None:
-    """Make a recording of what is left of one: all whole frames, up to a second before its program was killed."""
+    """Recover an interrupted recording: all whole frames, up to a second before the program was killed."""
     from radarize.io.recording import recover
 
-    tell(recover(part, output))
+    print_summary(recover(part, output))
 
 
 @app.command()
 def calibrate(
     recording: RecordingFile,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Board's file to write (board.yaml), or the radar's .cfg.")
+        Path, typer.Option("--output", "-o", help="Board file (board.yaml) or radar configuration (.cfg) to write.")
     ],
     target: Annotated[
         float | None,
-        typer.Option(metavar="M", help="Corner reflector straight ahead at so many m; the radar stands still."),
+        typer.Option(metavar="M", help="Distance of a corner reflector straight ahead, m; the radar stands still."),
     ] = None,
 ) -> None:
     """Calibrate a radar from an ordinary walk of 20 s: channels, range bias, mounting. No reflector is needed.
@@ -210,7 +226,7 @@ def calibrate(
 
 @app.command()
 def info(recording: RecordingFile, as_json: AsJson = False) -> None:
-    """Say what a recording holds."""
+    """Print what a recording contains."""
     from radarize.evaluation.report.contents import contents, show
 
     found = contents(recording)
@@ -222,13 +238,13 @@ def check(
     recording: RecordingFile,
     fix: Annotated[
         Path | None,
-        typer.Option(metavar="OUTPUT", help="Write a mended recording (.h5), or the right board's file (.yaml)."),
+        typer.Option(metavar="OUTPUT", help="Write a corrected recording (.h5) or board file (.yaml)."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find what is wrong with a recording: I and Q, antennas, chirps, frames, stamps. Exit code 1 if anything is.
+    """Find faults of a recording: I and Q, antennas, chirps, frames, time stamps. Exit code 1 if there are any.
 
-    Ten seconds of a walk are enough: radarize check walk.h5
+    Ten seconds of a walk are sufficient: radarize check walk.h5
     """
     from radarize.io.load import load
     from radarize.pipeline.check.check import check

@@ -1,4 +1,4 @@
-"""Commands that make runs, and what comes after one."""
+"""Commands that run odometry and SLAM, and evaluate, export, report or show the result."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -23,20 +23,21 @@ from radarize.io.console import print_table, progress, working
 @app.command("run")
 def run_(
     recording: RecordingFile,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Run folder to write.")],
     odometry: Annotated[str | None, typer.Option(help=f"Method of odometry: {names('radarize.odometry')}.")] = None,
     scans: Annotated[str | None, typer.Option(help=f"Method of scans: {names('radarize.scans')}.")] = None,
     settings: Annotated[
-        Reading, typer.Option(help="Reading of the paper: published is --odometry published --scans published.")
+        Reading,
+        typer.Option(help="Variant of the paper's method: published is --odometry published --scans published."),
     ] = "corrected",
     weights: Annotated[
-        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+        Path | None, typer.Option(help="Folder with network weights; by default the shipped ones.")
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
+    config: Annotated[Path | None, typer.Option(help="Pipeline settings (YAML), see `radarize config`.")] = None,
     every: Annotated[int, typer.Option(min=1, help="Use every N-th frame.")] = 1,
     board: BoardFile = None,
 ) -> None:
-    """Estimate trajectory and map of a recording."""
+    """Estimate the trajectory and the map of a recording."""
     from radarize.io.load import load
     from radarize.pipeline.check.check import warnings_before
     from radarize.pipeline.odometry import configuration
@@ -45,15 +46,15 @@ def run_(
 
     tuned = configuration(config)
     with load(recording, board=str(board) if board else None) as source:
-        words = effort(source.config, len(source)) if source.has_samples else ""
-        told = warnings_before(source[:])
-        warn([*([words] if words else []), *told])
-        with progress("run", f"{output} is as it was before, and so is the recording") as report:
+        slow = effort(source.config, len(source)) if source.has_samples else ""
+        warned = warnings_before(source[:])
+        warn([*([slow] if slow else []), *warned])
+        with progress("run", f"{output} and the recording are unchanged") as report:
             made = run(
                 source[::every], output, odometry=odometry, scans=scans, settings=settings, weights=weights,
                 config=tuned, progress=report,
             )  # fmt: skip
-    warn([words for words in made.warnings if words not in told])
+    warn([each for each in made.warnings if each not in warned])
     print(made.path)
 
 
@@ -75,19 +76,23 @@ def config_(
 
 @app.command()
 def slam(
-    scans: Annotated[Path, typer.Argument(metavar="SCANS|RUN", help="Scans (.npz), or a run's folder.")],
+    scans: Annotated[Path, typer.Argument(metavar="SCANS|RUN", help="Scans (.npz), or a run folder.")],
     odometry: Annotated[
-        Path | None, typer.Argument(metavar="[ODOMETRY]", help="Poses (TUM); else scans alone.")
+        Path | None,
+        typer.Argument(metavar="[ODOMETRY]", help="Odometry poses (TUM file); without them scans alone are used."),
     ] = None,
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    preset: Annotated[str | None, typer.Option(help="radar (of a RUN), lidar (of a file) or cartographer.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Run folder to write.")],
+    preset: Annotated[
+        str | None,
+        typer.Option(help="Preset of settings: radar (default for a RUN), lidar (default for a file), cartographer."),
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="Settings that differ from the preset (.yaml).")] = None,
-    reference: Annotated[Path | None, typer.Option(help="True poses (TUM), for `radarize evaluate`.")] = None,
+    reference: Annotated[Path | None, typer.Option(help="True poses (TUM file), for `radarize evaluate`.")] = None,
 ) -> None:
-    """Estimate trajectory and map from scans and odometry of any sensor.
+    """Estimate trajectory and map from scans, and odometry if there is any, of any sensor.
 
-    SCANS holds ranges (scan, beam), angle_min, angle_increment, range_max and, unless one a second, times.
+    SCANS has the arrays ranges (scan, beam), angle_min, angle_increment, range_max, and times (s) unless 1 s apart.
     """
     from radarize.pipeline.log import run
     from radarize.pipeline.runfolder import RunFolder
@@ -105,10 +110,10 @@ def slam(
 def evaluate(
     run: RunPath,
     beside: Beside = None,
-    reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
+    reference: Annotated[Path | None, typer.Option(help="True poses (TUM file); by default those in the run.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare a run with the truth; writes metrics.json."""
+    """Compare a run with true poses; write metrics.json."""
     from radarize.evaluation.evaluation import evaluate
     from radarize.evaluation.report.words import beside as compared
 
@@ -127,7 +132,7 @@ def evaluate(
 
 @app.command()
 def export(
-    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="Recording or run folder.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="File or, of ros2 and roverd, folder to write.")],
     format: Annotated[
         str,
@@ -136,7 +141,9 @@ def export(
             "a ROS 1 bag for the paper's code; tum: poses; ply: points; map: a run's map for map_server."
         ),
     ],
-    run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,
+    run: Annotated[
+        Path | None, typer.Option(help="Run of the recording; its scans and odometry are added to the bag.")
+    ] = None,
     iq_order: Annotated[
         Literal["iiqq", "qqii"] | None,
         typer.Option(help="Of bin: mmWave Studio's order, or the SDK demo's; default: the recording's."),
@@ -145,7 +152,7 @@ def export(
         float | None, typer.Option(help="Of bags: s, added to stamps; default: 1.7e9 where they begin near zero.")
     ] = None,
 ) -> None:
-    """Write a recording or a run for other programs."""
+    """Convert a recording or a run to a file format of other programs."""
     from radarize.io.exporters import export
 
     with progress("export") as report:
@@ -156,11 +163,11 @@ def export(
 
 @app.command()
 def report(
-    source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="A run's folder, or a recording.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="Run folder or recording.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="HTML page to write.")] = None,
     beside: Beside = None,
 ) -> None:
-    """Draw a run or a recording as one HTML page."""
+    """Write an HTML page with plots of a run or a recording."""
     from radarize.evaluation.report.recording import report_recording
     from radarize.evaluation.report.run import report_run
 
@@ -171,13 +178,14 @@ def report(
 
 @app.command()
 def view(
-    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
-    run: Annotated[Path | None, typer.Option(help="Run of the recording, to show with it.")] = None,
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="Recording or run folder.")],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, shown together with it.")] = None,
     save: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write .rrd, or .mcap for Foxglove, instead of a window.")
+        Path | None,
+        typer.Option(metavar="FILE", help="File to write instead of opening a window: .rrd, or .mcap for Foxglove."),
     ] = None,
 ) -> None:
-    """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and path types on one time line."""
+    """Show a recording or a run in the Rerun viewer: maps, poses, scans, depth and path types on one time line."""
     written: Path | None
     warn(damage(source))
     with progress("view") as report:

@@ -96,6 +96,6 @@ def evaluate(
         if true:
             figures["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
         metrics["map"] = figures
-    if run.blind:
-        metrics["blind"] = run.blind.model_dump()
+    if run.unobservable_spans:
+        metrics["blind"] = run.unobservable_spans.model_dump()
     return without_nan(metrics)

@@ -1,2 +1,2 @@
-"""Files and recordings: guarded openers of what comes from elsewhere, `recording` (HDF5), `importers` and `exporters`
-(foreign formats), `load`; errors, plain data, poses and trajectories, progress on the terminal, jobs and plug-ins."""
+"""Files and recordings: safe readers of foreign files, `recording` (HDF5), `importers` and `exporters` (other formats),
+`load`; errors, plain data, poses and trajectories, progress on the terminal, parallel jobs and plug-ins."""

@@ -1,4 +1,4 @@
-"""Trajectories to compare: reading, bringing two onto common stamps, projecting to the plane, aligning.
+"""Compare trajectories: read them, interpolate to common stamps, project to the plane, align.
 
 Trajectories are evo's `PoseTrajectory3D`. Planar ones lie in z = 0 and turn about z only.
 """
@@ -15,25 +15,25 @@ from scipy.spatial.transform import Rotation, Slerp
 from radarize.io.errors import InputError
 from radarize.io.tum import read_tum
 
-#: s: stamps this close belong together (the paper's association).
+#: s, maximum difference of stamps that are matched (as in the paper).
 NEAR = 0.01
-#: s: a reference is interpolated across gaps up to this long; a walker turns by some degrees meanwhile.
+#: s, longest gap over which a reference is interpolated; a pedestrian turns by a few degrees in this time.
 LONGEST_GAP = 0.2
 
 Association = Literal["interpolate", "nearest"]
 
 
 def trajectory(times: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 7"]) -> PoseTrajectory3D:
-    """evo's trajectory of stamps (s) and poses (position m, quaternion x y z w)."""
+    """Return an evo trajectory from stamps (s) and poses (position m, quaternion x y z w)."""
     poses = np.asarray(poses, float)
     return PoseTrajectory3D(poses[:, :3], np.roll(poses[:, 3:], 1, axis=1), np.asarray(times, float))
 
 
 def load(path: Path) -> PoseTrajectory3D:
-    """A trajectory from a TUM file.
+    """Read a trajectory from a TUM file.
 
     Raises:
-        InputError: naming the line that holds no pose or a NaN, or that there are none.
+        InputError: a line has no pose or a NaN, or there are no poses; names the line.
     """
     return trajectory(*read_tum(path))
 
@@ -44,13 +44,13 @@ def matched(
     association: Association = "interpolate",
     names: tuple[str, str] = ("estimate", "reference"),
 ) -> tuple[PoseTrajectory3D, PoseTrajectory3D]:
-    """Both trajectories at the same instants.
+    """Return both trajectories at common times.
 
     Args:
         estimate, reference: with finite poses.
         association: ``"interpolate"`` gives the reference at the estimate's stamps where its neighbours are close
             enough (`LONGEST_GAP`), and the nearest pose within `NEAR` elsewhere; ``"nearest"`` is the latter only.
-        names: what errors call them.
+        names: names of the trajectories in errors.
 
     Returns:
         Estimate and reference of equal length; stamps are the estimate's.
@@ -92,13 +92,13 @@ def _span(name: str, times: np.ndarray) -> str:
 
 
 def yaws(path: PoseTrajectory3D) -> Float[np.ndarray, "pose"]:
-    """Heading of the x axis about z, rad."""
+    """Return the headings of the x axis about z, rad."""
     forward = Rotation.from_quat(path.orientations_quat_wxyz, scalar_first=True).apply([1.0, 0.0, 0.0])
     return np.arctan2(forward[:, 1], forward[:, 0])
 
 
 def planar(path: PoseTrajectory3D) -> PoseTrajectory3D:
-    """The trajectory in the plane: x, y, yaw."""
+    """Return the trajectory projected to the plane: x, y, yaw."""
     positions = path.positions_xyz * [1.0, 1.0, 0.0]
     quaternions = Rotation.from_rotvec(yaws(path)[:, None] * [0.0, 0.0, 1.0]).as_quat(scalar_first=True)
     return PoseTrajectory3D(positions, quaternions, path.timestamps)
@@ -107,10 +107,10 @@ def planar(path: PoseTrajectory3D) -> PoseTrajectory3D:
 def alignment(
     estimate: PoseTrajectory3D, reference: PoseTrajectory3D, in_plane: bool
 ) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
-    """Rotation and translation (no scale) that bring the estimate closest to the reference (Umeyama, PAMI 1991).
+    """Return rotation and translation (no scale) that align the estimate with the reference (Umeyama, PAMI 1991).
 
-    In the plane it turns about z only. Where positions cannot tell the rotation (a sensor that stands still), it is
-    the mean rotation between attitudes.
+    In the plane it rotates about z only. If positions do not determine the rotation (the sensor stands still), it is
+    the mean rotation between orientations.
     """
     x, y = estimate.positions_xyz.T, reference.positions_xyz.T
     size = 2 if in_plane else 3
@@ -128,7 +128,7 @@ def alignment(
 def fitted(
     estimate: PoseTrajectory3D, reference: PoseTrajectory3D
 ) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
-    """The `alignment` in the plane of what two trajectories have in common.
+    """Return the `alignment` in the plane of the common part of two trajectories.
 
     Raises:
         InputError: fewer than three poses match.
@@ -138,7 +138,7 @@ def fitted(
 
 
 def moved(path: PoseTrajectory3D, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]) -> PoseTrajectory3D:
-    """The trajectory in another frame: each pose T becomes (turn, shift) T."""
+    """Return the trajectory in another frame: each pose T becomes (turn, shift) T."""
     attitudes = Rotation.from_matrix(turn) * Rotation.from_quat(path.orientations_quat_wxyz, scalar_first=True)
     positions = path.positions_xyz @ turn.T + shift
     return PoseTrajectory3D(positions, attitudes.as_quat(scalar_first=True), path.timestamps)

@@ -1,4 +1,4 @@
-"""Matplotlib axes where none are given, and PNG pictures for notebooks."""
+"""Matplotlib axes, created if none are given, and PNG images for notebooks."""
 
 import io
 from collections.abc import Callable
@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Dots per inch of a notebook's pictures.
+#: Dots per inch of images in notebooks.
 _DPI = 90
 
 
 def axes_or_new(axes: "Axes | None" = None) -> "Axes":
-    """The given axes, or those of a new figure of pyplot."""
+    """Return the given axes, or those of a new pyplot figure."""
     if axes is None:
         import matplotlib.pyplot as plt
 
@@ -21,7 +21,7 @@ def axes_or_new(axes: "Axes | None" = None) -> "Axes":
 
 
 def png(plot: Callable[["Axes"], object]) -> bytes:
-    """What a function draws on axes, as a PNG; pyplot knows nothing of it."""
+    """Return what a function draws on axes as a PNG; the figure is not registered with pyplot."""
     from matplotlib.figure import Figure
 
     figure, buffer = Figure(layout="constrained"), io.BytesIO()

@@ -1,4 +1,4 @@
-"""What both command lines share: errors as one sentence, progress bars, and how a command is stopped."""
+"""Functions that both command lines share: errors as one sentence, progress bars, tables, and interrupts."""
 
 import os
 import signal
@@ -20,16 +20,16 @@ from radarize.io.files import OUTSIDE
 
 #: Exit code of everything that ends in an error sentence.
 FAILED = 2
-#: Options that every command takes, and the environment variables that say so to its jobs.
+#: Options of every command, and the environment variables that pass them to its jobs.
 _EVERYWHERE = {"--debug": DEBUG, "--allow-outside": OUTSIDE}
 #: s between lines of progress where stderr is no terminal.
 _PACE = 10.0
-#: Letters of a word that a table does not cut.
+#: Longest word, in letters, that a table does not break.
 _WORD = 32
 
 
 def new_app(about: str) -> typer.Typer:
-    """A command line with the options that every command takes."""
+    """Return a command line with the options that every command has."""
     app = typer.Typer(help=about, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
     @app.callback()
@@ -57,16 +57,16 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
     """Run a command line and exit: 0, or 2 with one sentence on stderr.
 
     Args:
-        app: its commands; name: as the user typed it.
-        arguments: the process's own if None.
+        app: the commands; name: as the user typed it.
+        arguments: arguments; those of the process if None.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in arguments
     for option, variable in _EVERYWHERE.items():
         if option in arguments:
-            os.environ[variable] = "1"  # for jobs, too, wherever they are done
+            os.environ[variable] = "1"  # for jobs on other machines too
     arguments = [argument for argument in arguments if argument not in _EVERYWHERE]
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a request to terminate ends it as Ctrl-C does
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM acts like Ctrl-C
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="surrogateescape")  # names of files are bytes, which need not be UTF-8
     try:
@@ -77,22 +77,22 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
             raise
         print(f"{name}: {_sentence(error)}", file=sys.stderr)
         code = FAILED
-    if code == 130:  # how Typer hands on an interrupt that no command caught
+    if code == 130:  # Typer's exit code of an interrupt that no command caught
         print(f"\n{name}: stopped; nothing was written", file=sys.stderr)
         code = FAILED
     sys.exit(code if isinstance(code, int) else 0)
 
 
 def _refuse_lost_folder() -> None:
-    """Refuse a working folder that was deleted: libraries in C end the process there, without a word.
+    """Refuse a deleted working folder: libraries in C would end the process there without a message.
 
     Raises:
-        InputError: it is not there.
+        InputError: the folder does not exist.
     """
     try:
         os.getcwd()
     except FileNotFoundError:
-        raise InputError("the working folder was deleted, expected one that is there: cd to another") from None
+        raise InputError("the working folder was deleted, expected an existing one: cd to another") from None
 
 
 def _sentence(error: BaseException) -> str:
@@ -113,11 +113,11 @@ def _sentence(error: BaseException) -> str:
 
 @contextmanager
 def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
-    """Progress on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all).
+    """Show progress on stderr; call what this yields with (done, total) or (stage, done, total).
 
-    In a terminal these are bars, elsewhere a line every `_PACE` s.
+    A terminal shows bars, a log gets a line every `_PACE` s.
 
-    Ctrl-C becomes an InputError of what `stopped` says.
+    Ctrl-C becomes an InputError with the text `stopped`.
     """
     with (_bars if sys.stderr.isatty() else _lines)(label) as move:
         try:
@@ -128,7 +128,7 @@ def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def _bars(label: str) -> Iterator[Callable[..., None]]:
-    """Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar."""
+    """Show progress bars, and a spinner until the first call, so that an early error appears without a bar."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
@@ -159,9 +159,9 @@ def _bars(label: str) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def _lines(label: str) -> Iterator[Callable[..., None]]:
-    """What, how much, how long so far and how long still, for logs."""
+    """Print lines for logs: stage, progress, time so far and time left."""
     start, ended, moved = time.monotonic(), threading.Event(), [""]
-    begun: dict[str, tuple[float, float]] = {}  # by stage: when, and how much was done then
+    begun: dict[str, tuple[float, float]] = {}  # by stage: start time, and amount done at that time
 
     def move(*where: Any) -> None:
         *stage, done, total = where
@@ -171,13 +171,13 @@ def _lines(label: str) -> Iterator[Callable[..., None]]:
         left = (total - done) * (now - since) / (done - before) if total and done > before else None
         moved[:] = [f"{name}: {done}{share}", f", {_clock(left)} to go" if left is not None else ""]
 
-    def tell() -> None:
+    def print_progress() -> None:
         while not ended.wait(_PACE):
             what, *left = moved
             sofar = f"{_clock(time.monotonic() - start)} so far"
             print(f"{what or label}, {sofar}{''.join(left)}", file=sys.stderr, flush=True)
 
-    thread = threading.Thread(target=tell, daemon=True)
+    thread = threading.Thread(target=print_progress, daemon=True)
     thread.start()
     try:
         yield move
@@ -193,7 +193,7 @@ def _clock(seconds: float) -> str:
 
 @contextmanager
 def working(label: str) -> Iterator[None]:
-    """A spinner on stderr, or lines, for steps that cannot say how far they are."""
+    """Show a spinner on stderr, or lines, for steps without known progress."""
     if not sys.stderr.isatty():
         with _lines(label):
             yield
@@ -205,7 +205,7 @@ def working(label: str) -> Iterator[None]:
 
 
 def printable(value: object) -> str:
-    """Data as text that does nothing to a terminal."""
+    """Return data as text without control characters for a terminal."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in str(value))
 
 
@@ -215,9 +215,9 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: 
     Lines break between words; a word of up to `_WORD` letters stays whole, unless there are too many such columns.
 
     Args:
-        head: of the columns.
-        rows: of as many cells.
-        numbers: columns that are right-aligned.
+        head: headings of the columns.
+        rows: cells of each row.
+        numbers: indices of columns that are right-aligned.
     """
     from rich import box
     from rich.console import Console
@@ -228,7 +228,7 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: 
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     columns = list(zip(head, *cells, strict=True))
     widths = [min(max(len(word) for cell in column for word in cell.split() or [""]), _WORD) for column in columns]
-    # Heads of figures may break; of the others, and of all cells, the one that breaks most gets the room that is left.
+    # Headings of numeric columns may break; of the others, and of all cells, the longest ones get the remaining width.
     wanted = [max(map(len, column[k in numbers :]), default=0) for k, column in enumerate(columns)]
     room = console.width - 2 * (len(head) - 1)
     while sum(widths) > room and max(widths) > 1:
@@ -246,7 +246,7 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: 
 
 @contextmanager
 def until_interrupted() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C sets, or a request to terminate, or the terminal's end; a second one interrupts as
+    """Yield an event that is set by the first Ctrl-C, SIGTERM or the end of the terminal; a second one interrupts as
     usual."""
     asked = threading.Event()
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

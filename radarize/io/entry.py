@@ -1,11 +1,11 @@
-"""Where the commands begin: what they import takes a moment, in which Ctrl-C is a sentence, too."""
+"""Entry points of the commands; importing takes a moment, in which Ctrl-C also ends with one sentence."""
 
 import sys
 from importlib import import_module
 
 
 def begin(name: str) -> None:
-    """Run the command line of a package; exits."""
+    """Run the command line of a package and exit."""
     try:
         commands = import_module(f"{name}.cli")
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""The one exception that users meet."""
+"""The exception for unusable input, and reasons of other errors in words."""
 
 import errno
 import os
@@ -7,13 +7,13 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-#: Environment variable of processes that show tracebacks.
+#: Environment variable that makes processes print tracebacks.
 DEBUG = "RADARIZE_DEBUG"
-#: What `reason` says of a full disk, whoever found it.
+#: Result of `reason` for a full disk, whichever library reports it.
 FULL = "no space left on the device"
-#: Where processes exchange data (Linux), and bytes below which it is full.
+#: Folder of shared memory (Linux), and free bytes below which it counts as full.
 SHARED_MEMORY, _SHARED = "/dev/shm", 1 << 20
-#: Characters of a sentence that somebody reads.
+#: Maximum length of an error sentence, characters.
 _LONGEST = 1000
 
 
@@ -38,10 +38,10 @@ class InputError(Exception):
 
 
 def refuse_unknown(given: Mapping[str, object], options: type) -> None:
-    """Refuse keywords that a `TypedDict` of options does not have.
+    """Refuse keywords that a `TypedDict` of options does not define.
 
     Raises:
-        InputError: there are some.
+        InputError: there are unknown keywords.
     """
     known = options.__annotations__
     if unknown := given.keys() - known.keys():
@@ -49,11 +49,11 @@ def refuse_unknown(given: Mapping[str, object], options: type) -> None:
 
 
 class DiskFull(InputError):
-    """There is no space left where something was to be written."""
+    """There is no space left on the disk that should be written."""
 
 
 def of_system(error: OSError) -> str:
-    """What the system says, and of which file; shared memory, in which nobody named a file, if that is full."""
+    """Return the system's message and the file; shared memory has no file name and is named if it is full."""
     if not error.filename and error.errno == errno.ENOSPC and os.path.isdir(SHARED_MEMORY):
         if shutil.disk_usage(SHARED_MEMORY).free < _SHARED:
             return f"{SHARED_MEMORY}: {FULL}, expected room for what processes exchange: free some of it"
@@ -61,12 +61,12 @@ def of_system(error: OSError) -> str:
 
 
 def first_line(error: BaseException) -> str:
-    """The first line of an error's own words, or what kind it is if it has none."""
+    """Return the first line of an error's message, or its type if it has none."""
     return str(error).strip().split("\n", 1)[0] or type(error).__name__
 
 
 def disk_full(error: BaseException | None) -> bool:
-    """Whether an error, or one that it comes from, is that of a full disk."""
+    """Return whether an error, or one of its causes, is that of a full disk."""
     while error is not None:
         if isinstance(error, DiskFull) or _no_space(error):
             return True
@@ -75,7 +75,8 @@ def disk_full(error: BaseException | None) -> bool:
 
 
 def _no_space(error: BaseException) -> bool:
-    """Whether the system found no space; libraries in C, as HDF5, give its number in their text alone."""
+    """Return whether there was no disk space; libraries in C, such as HDF5, state the error number in their text
+    only."""
     if isinstance(error, OSError) and error.errno is not None:
         return error.errno == errno.ENOSPC
     words = rf"no space left on device|errno = {errno.ENOSPC}\b"
@@ -83,7 +84,7 @@ def _no_space(error: BaseException) -> bool:
 
 
 def reason(error: Exception) -> str:
-    """What a library or the system says went wrong with a file, in a few printable words."""
+    """Return the reason of a file error, as a library or the system states it, in a few printable words."""
     text = str(error)
     if _no_space(error):
         return FULL
@@ -95,8 +96,10 @@ def reason(error: Exception) -> str:
 
 @contextmanager
 def explained(message: str, *kinds: type[Exception]) -> Iterator[None]:
-    """Turn errors, of any kind if none is named, into an InputError of `message` and the reason (DiskFull if that is
-    it): of damaged files, libraries raise whatever their parsers meet."""
+    """Turn errors, by default of any kind, into an InputError of `message` and the reason, or DiskFull for a full disk.
+
+    On damaged files, libraries raise errors of any kind.
+    """
     expected = kinds or (Exception,)
     try:
         yield

@@ -1,6 +1,6 @@
-"""What `pip install radarize` leaves out, and who is missed by a command without it."""
+"""Optional dependencies that `pip install radarize` leaves out, and the message when a command lacks one."""
 
-#: Modules of the extras of pyproject.toml, as they are imported.
+#: Import names of the modules of each extra in pyproject.toml.
 EXTRAS = {
     "sim": {
         "contourpy", "drjit", "llvmlite", "mapbox_earcut", "mitsuba", "open3d", "rtree", "sionna", "torchmetrics",
@@ -13,7 +13,7 @@ EXTRAS = {
 
 
 def lacking(error: BaseException) -> str | None:
-    """What to type for the extra that an import misses; None if the error is another, or the module nobody's."""
+    """Return which extra to install for a failed import; None for another error or an unknown module."""
     module = (getattr(error, "name", None) or "").split(".")[0] if isinstance(error, ModuleNotFoundError) else ""
     for extra, modules in EXTRAS.items():
         if module in modules:

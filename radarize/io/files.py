@@ -1,26 +1,26 @@
-"""Files from elsewhere: regular ones, and of no more bytes than their reader is made for."""
+"""Safe access to foreign files: regular files only, of a limited size."""
 
 import os
 from pathlib import Path
 
 from radarize.io.errors import InputError, explained
 
-#: Bytes of text that people write: a hundred thousand lines.
+#: Maximum bytes of text that people write: a hundred thousand lines.
 TEXT = 8 << 20
-#: Bytes that deflate makes of one at most (zlib's technical details).
+#: Maximum compression ratio of deflate (zlib's technical details).
 DEFLATE = 1032
-#: Environment variable of processes in which files may name others anywhere.
+#: Environment variable that allows files to name other files in any folder.
 OUTSIDE = "RADARIZE_ALLOW_OUTSIDE"
 
 
 def regular(path: str | Path, expected: str) -> Path:
-    """A file that is there and can be read to its end: no folder, no device, and no pipe, which would be waited for.
+    """Return the path of an existing regular file; folders, devices and pipes (which would block) are refused.
 
     Args:
-        expected: what it should be, in words.
+        expected: description of the expected file.
 
     Raises:
-        InputError: it is none.
+        InputError: there is no such file.
     """
     path = Path(path)
     with explained(f"{path}: cannot be read", OSError, ValueError):  # a NUL within its name
@@ -32,14 +32,14 @@ def regular(path: str | Path, expected: str) -> Path:
 
 
 def read_bytes(path: str | Path, expected: str, most: int = TEXT) -> bytes:
-    """All of a file.
+    """Read a whole file.
 
     Args:
-        expected: what it should be, in words.
-        most: bytes that it may have.
+        expected: description of the expected file.
+        most: maximum size, bytes.
 
     Raises:
-        InputError: it is none, cannot be read, or is larger.
+        InputError: there is no such file, it cannot be read, or it is larger.
     """
     path = regular(path, expected)
     with explained(f"{path}: cannot be read", OSError), path.open("rb") as file:
@@ -50,10 +50,10 @@ def read_bytes(path: str | Path, expected: str, most: int = TEXT) -> bytes:
 
 
 def read_text(path: str | Path, expected: str, most: int = TEXT) -> str:
-    """All of a file of UTF-8 text, see `read_bytes`.
+    """Read a whole file of UTF-8 text, see `read_bytes`.
 
     Raises:
-        InputError: as there, or it is no such text.
+        InputError: as in `read_bytes`, or it is not UTF-8.
     """
     content = read_bytes(path, expected, most)
     with explained(f"{path}: cannot be read", UnicodeDecodeError):
@@ -61,15 +61,15 @@ def read_text(path: str | Path, expected: str, most: int = TEXT) -> str:
 
 
 def within(path: Path, source: str | Path, *folders: Path) -> Path:
-    """A file that another one names, which lies in its folder or below, links followed; unless the user allows others.
+    """Return a path that another file names, if it is in allowed folders (links followed) or the user allows any.
 
     Args:
-        path: as named, from its folder.
-        source: what names it.
-        folders: that it may lie in.
+        path: the path, relative to the folder of `source` resolved.
+        source: file that names it.
+        folders: allowed folders.
 
     Raises:
-        InputError: it lies elsewhere.
+        InputError: the path is outside of these folders.
     """
     if os.environ.get(OUTSIDE) or any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
         return path

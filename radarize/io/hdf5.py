@@ -1,7 +1,7 @@
-"""HDF5 files from elsewhere: all of them lies within them, and no data set declares more than is there.
+"""Safe access to foreign HDF5 files: no links to other files, and no data set larger than the file can hold.
 
-HDF5 follows what a file says into any other one that its reader may read: external links, external storage, and the
-sources of virtual data sets. Every file is opened here, and one with any of these is refused before anything is read.
+HDF5 follows external links, external storage and sources of virtual data sets into any file that the user may read.
+Every file is opened here, and one with any of these is refused before anything is read.
 """
 
 import math
@@ -15,25 +15,25 @@ import h5py
 from radarize.io.errors import InputError
 from radarize.io.files import DEFLATE
 
-#: Version of the format that is written: the oldest that can be read while it grows, and so read by most.
+#: Version of the file format that is written: the oldest that can be read while it grows, hence the most readable.
 FORMAT = "v110"
-#: Bytes that a packed chunk takes at least.
+#: Minimum bytes of a compressed chunk.
 _PACKED_CHUNK = 16
-#: Bytes and chunks that a data set may declare before they are on disk: frames of a growing file that are not flushed
-#: yet. HDF5 itself takes some 3 kB for each chunk that it reads at once.
+#: Bytes and chunks that a data set may declare before they are on disk: unflushed frames of a growing file. HDF5 needs
+#: about 3 kB of memory per chunk that it reads at once.
 _BYTES_AHEAD, _CHUNKS_AHEAD = 64 << 20, 8192
 
 
 @contextmanager
 def open_hdf5(path: Path, content: BinaryIO | None = None, mode: str = "r") -> Iterator[h5py.File]:
-    """A file, opened.
+    """Open an HDF5 file.
 
     Args:
-        content: to read instead of the file itself.
-        mode: ``r``, or ``r+`` to change it.
+        content: file object to read instead of the file.
+        mode: ``r``, or ``r+`` to change the file.
 
     Raises:
-        InputError: some of it lies in other files.
+        InputError: a part of it is in other files.
         OSError: it cannot be opened.
     """
     with h5py.File(content or path, mode, **({"libver": FORMAT} if mode == "r+" else {})) as file:
@@ -44,10 +44,10 @@ def open_hdf5(path: Path, content: BinaryIO | None = None, mode: str = "r") -> I
 
 
 def _elsewhere(file: h5py.File, name: bytes) -> str | None:
-    """What of a link lies in other files, if anything: its target, or the target's entries."""
+    """Return a description of a link or data set whose content is in other files; None if there is none."""
     kind, shown = file.id.links.get_info(name).type, name.decode(errors="replace")
     if kind == h5py.h5l.TYPE_SOFT:
-        return None  # a path through this file, of which every link is looked at
+        return None  # a path within this file, all links of which are checked
     if kind != h5py.h5l.TYPE_HARD:
         return f"{shown} is a link to something"
     item = h5py.h5o.open(file.id, name)
@@ -62,16 +62,16 @@ def _elsewhere(file: h5py.File, name: bytes) -> str | None:
 def dataset(
     group: h5py.Group, name: str, path: Path, packed: float = DEFLATE, ahead: int = _BYTES_AHEAD, kinds: str = "biufc"
 ) -> h5py.Dataset:
-    """A data set of numbers that lies in the file, and is no larger than what lies there can be.
+    """Return a numeric data set that is stored in the file and not larger than its stored bytes allow.
 
     Args:
-        group, name: where it is; path: of the file.
-        packed: bytes that one on disk may stand for.
+        group, name: location of the data set; path: of the file.
+        packed: maximum compression ratio.
         ahead: bytes that may be declared before they are on disk.
-        kinds: of its entries, as numpy calls them.
+        kinds: allowed kinds of entries, as in numpy.
 
     Raises:
-        InputError: it is not.
+        InputError: the data set is not of this kind.
         KeyError: there is none of that name.
     """
     data = group[name]

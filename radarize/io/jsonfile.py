@@ -1,4 +1,4 @@
-"""JSON files that this package writes, and reads whatever became of them."""
+"""Reader of JSON files, with limits for damaged ones."""
 
 import json
 from collections.abc import Callable
@@ -7,24 +7,24 @@ from pathlib import Path
 from radarize.io.errors import InputError, explained
 from radarize.io.files import read_text
 
-#: Digits of a whole number.
+#: Maximum number of digits of an integer.
 _DIGITS = 40
 
 
 def read_json(path: Path) -> dict:
-    """A JSON object, empty if there is no such file.
+    """Read a JSON object; empty if there is no file.
 
     Raises:
-        InputError: it is not JSON, or far larger than any that this package writes.
+        InputError: not JSON, or far larger than any file that this package writes.
     """
     return parse_json(read_text(path, "JSON"), str(path)) if path.exists() else {}
 
 
 def parse_json(text: str, name: str, number: Callable[[str], object] = float) -> dict:
-    """A JSON object, whose fractions become what `number` makes of them; errors call it `name`.
+    """Parse a JSON object; `number` converts fractions, and errors start with `name`.
 
     Raises:
-        InputError: it is not JSON, or no object.
+        InputError: not JSON, or not an object.
     """
     with explained(f"{name}: is not JSON", ValueError, RecursionError):  # thousands of digits, too deep
         content = json.loads(text, parse_float=number, parse_int=_whole)

@@ -1,4 +1,4 @@
-"""Recordings from any file that holds a radar's samples."""
+"""Load recordings from any file with a radar's samples."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -13,13 +13,13 @@ from radarize.io.recording import Clip, Recording, in_temporary_file
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
 
-#: What the pipeline takes: frames, or all those of a recording, open or not.
+#: Frames, or a recording (open, or its file) for all its frames.
 Source = Clip | Recording | str | Path
 _HDF5 = b"\x89HDF"
 
 
 class Samples(Protocol):
-    """Frames that maps and points are made of: those of a recording, or a live one; see `Clip`."""
+    """Interface of frames that maps and points are computed from: frames of a recording or a live frame; see `Clip`."""
 
     @property
     def numbers(self) -> range: ...
@@ -38,7 +38,7 @@ class Samples(Protocol):
 
 
 class CaptureOptions(TypedDict, total=False):
-    """What a foreign file does not say of itself; the options of ``radarize import``."""
+    """Settings of a foreign file that it does not contain; the options of ``radarize import``."""
 
     config: str | Path | RadarConfig | None
     poses: Path | None
@@ -74,20 +74,21 @@ def load(
     progress: Callable[[int, int], None] | None = None,
     **given: Unpack[CaptureOptions],
 ) -> Recording:
-    """Open a recording, or make one of a capture.
+    """Open a recording, or convert another capture to one.
 
-    Samples stay in the file until they are asked for. A capture of another format is first written as a recording: to
-    `output`, or to a temporary file that goes with the object.
+    Samples are read from the file on access. A capture of another format is first converted to a recording: `output`,
+        or
+    a temporary file that is deleted with the object.
 
     Args:
-        source: a recording (``.h5``); a DCA1000 ``.bin`` with its ``.cfg`` beside, a ``.pcap``, a folder of mmWave
-            Studio, a ROS bag, an array of samples (``.npy``, ``.npz``, ``.mat``): whatever ``radarize import`` reads.
-        output: recording to write (``.h5``), of a capture.
+        source: a recording (``.h5``), or any source of ``radarize import``: a DCA1000 ``.bin`` with its ``.cfg`` beside
+            it, a ``.pcap``, a folder of mmWave Studio, a ROS bag, an array of samples (``.npy``, ``.npz``, ``.mat``).
+        output: recording to write (``.h5``), for a capture of another format.
         progress: called with (frames done, frames in all).
-        given: what the capture does not say of itself, by the options of ``radarize import``: ``config`` (a preset, a
-            ``.cfg`` or ``.mmwave.json`` file, or a `RadarConfig`), ``poses`` (true ones, a TUM file), ``samples``,
-            ``loops``, ``rx`` and ``tx`` (a count, or TI's antenna numbers as in ``"1,3,2"``), ... in SI units. Of a
-            recording, too: ``board``, a file that `calibrate` wrote.
+        given: settings that the capture does not contain, named as the options of ``radarize import``: ``config`` (a
+            preset, a ``.cfg`` or ``.mmwave.json`` file, or a `RadarConfig`), ``poses`` (true poses, a TUM file),
+            ``samples``, ``loops``, ``rx`` and ``tx`` (a count, or TI's antenna numbers as in ``"1,3,2"``), ... in SI
+            units. A recording takes ``board``, a file that `calibrate` wrote.
 
     Returns:
         A recording: ``len(rec)`` frames, ``rec[100:110]`` some of them, ``rec.truth`` the true trajectory or None,
@@ -121,10 +122,10 @@ def load(
 
 
 def frames_of(source: Source) -> Clip:
-    """Frames as they are, or all of a recording.
+    """Return the frames, or all frames of a recording.
 
     Raises:
-        InputError: no recording.
+        InputError: not a recording.
     """
     if isinstance(source, Clip):
         return source
@@ -134,10 +135,10 @@ def frames_of(source: Source) -> Clip:
 
 
 def samples_of(source: Samples | Source) -> Samples:
-    """The same of what holds samples, a live frame too.
+    """Return the frames, or all frames of a recording, or a live frame.
 
     Raises:
-        InputError: it holds none.
+        InputError: there are no samples.
     """
     if not isinstance(source, Clip | Recording | str | Path) and hasattr(source, "numbers"):
         return source
@@ -167,7 +168,7 @@ def _settings(capture: CaptureOptions) -> Given:
 
 
 def _antennas(value: object, name: str) -> object:
-    """A count (``3``), or TI's antenna numbers (``1,3,2``) as 0-based ones."""
+    """Return a count (``3``), or TI's antenna numbers (``1,3,2``) as 0-based ones."""
     if not isinstance(value, str):
         return value
     try:
@@ -178,7 +179,7 @@ def _antennas(value: object, name: str) -> object:
 
 
 def _angles(value: str | tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-    """Roll, pitch, yaw, degrees."""
+    """Return roll, pitch, yaw, degrees."""
     if not isinstance(value, str):
         return value
     try:

@@ -1,4 +1,4 @@
-"""Files and folders that one program writes at a time; what it holds goes with its process, however that ends."""
+"""Locks on files and folders for a single writer; released when the process ends."""
 
 import fcntl
 import os
@@ -8,13 +8,13 @@ from radarize.io.errors import InputError, explained
 
 
 def hold(path: Path, others: bool = False) -> int:
-    """Hold a file or folder that is there; returns what `os.close` lets go of.
+    """Lock an existing file or folder; `os.close` of the returned descriptor releases it.
 
     Args:
-        others: may hold it in the same way at once: a reader that keeps writers away.
+        others: share the lock with others that do the same: readers that exclude writers.
 
     Raises:
-        InputError: another program holds it, or it cannot be opened.
+        InputError: another program holds the lock, or the path cannot be opened.
     """
     with explained(f"{path}: cannot be opened", OSError):
         handle = os.open(path, os.O_RDONLY)

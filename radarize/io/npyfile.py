@@ -1,4 +1,4 @@
-"""NumPy's array format, and zip archives of it: what a file declares is checked before any of it is unpacked."""
+"""Safe reader of NumPy arrays and zip archives of them: declared sizes are checked before unpacking."""
 
 import math
 import zipfile
@@ -13,19 +13,19 @@ from numpy.lib import format as npy
 from radarize.io.errors import InputError, explained
 from radarize.io.files import regular
 
-#: Bytes of numbers that one of an archive may unpack to, and bytes that any may.
+#: Maximum compression ratio of numbers in an archive, and bytes that are always allowed.
 _PACKED, _ALWAYS = 100, 16 << 20
-#: Ways of packing that are unpacked piece by piece: a piece of the others is as large as they say.
+#: Compression methods that are unpacked piece by piece; pieces of the others have any size.
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def npy_header(file: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dtype]:
-    """Shape, whether the first axis runs fastest, and type; the file then stands at the first entry.
+    """Return shape, whether the first axis varies fastest, and type; the file is then at the first entry.
 
     Raises:
-        InputError: no such file; `name` is what it is called there.
+        InputError: not in NumPy's format; `name` is its name in the message.
     """
-    with explained(f"{name}: is no array in NumPy's format"):  # Python's own tokenizer and parser are at work there
+    with explained(f"{name}: is no array in NumPy's format"):  # it uses Python's tokenizer and parser
         version = npy.read_magic(file)
         reader = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, stored = reader(file)
@@ -36,13 +36,13 @@ def npy_header(file: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dt
 
 @contextmanager
 def open_npz(source: Path | BinaryIO, name: str) -> Iterator[tuple[zipfile.ZipFile, dict[str, zipfile.ZipInfo]]]:
-    """An archive of arrays, with its members by the names of the arrays.
+    """Open an archive of arrays; yields it with its members by the names of the arrays.
 
     Args:
-        source: a file, or its content; `name` is what errors call it.
+        source: a file, or its content; `name` is its name in errors.
 
     Raises:
-        InputError: it is none, or packed in a way that does not tell how much it makes.
+        InputError: not an archive, or compressed by a method without known size.
     """
     if isinstance(source, Path):
         regular(source, "arrays (.npz)")
@@ -55,14 +55,14 @@ def open_npz(source: Path | BinaryIO, name: str) -> Iterator[tuple[zipfile.ZipFi
 
 
 def read_npz(source: Path | BinaryIO, name: str, fields: Sequence[str], size: int) -> dict[str, np.ndarray]:
-    """Arrays of numbers in an archive; those of `fields` that it has.
+    """Read arrays of numbers in an archive: those of `fields` that it has.
 
     Args:
-        source: a file, or its content; `name` is what errors call it.
-        size: of the archive, bytes.
+        source: a file, or its content; `name` is its name in errors.
+        size: size of the archive, bytes.
 
     Raises:
-        InputError: it is none, holds something else than numbers, or declares far more than it can hold.
+        InputError: not an archive, entries are not numbers, or it declares far more bytes than it can have.
     """
     with open_npz(source, name) as (archive, members):
         there, declared = [field for field in fields if field in members], 0

@@ -1,4 +1,4 @@
-"""Pictures from elsewhere, whose headers are asked before anything is unpacked."""
+"""Safe reader of foreign images: sizes in headers are checked before unpacking."""
 
 from pathlib import Path
 from typing import BinaryIO
@@ -10,24 +10,24 @@ from PIL import Image
 from radarize.io.errors import InputError, explained
 from radarize.io.files import regular
 
-#: Pixels of a picture: a map of 200 m x 200 m in cells of 5 cm.
+#: Maximum number of pixels of an image: a map of 200 m x 200 m with cells of 5 cm.
 MOST_PIXELS = 16 << 20
 
 
 def read_picture(
     source: Path | BinaryIO, name: str, formats: tuple[str, ...] = ("PNG",), most: int = MOST_PIXELS, gray: bool = True
 ) -> UInt[np.ndarray, "row column ..."]:
-    """A picture's pixels.
+    """Read the pixels of an image.
 
     Args:
         source: a file, or its content.
-        name: what errors call it.
-        formats: that it may have, as Pillow calls them.
-        most: pixels that it may have.
-        gray: as 8 bits of brightness; else as they are.
+        name: name in errors.
+        formats: allowed formats, as in Pillow.
+        most: maximum number of pixels.
+        gray: convert to 8 bits of brightness; else unchanged.
 
     Raises:
-        InputError: no such picture, or it has more pixels.
+        InputError: not such an image, or it has more pixels.
     """
     if isinstance(source, Path):
         regular(source, "a picture")

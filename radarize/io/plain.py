@@ -1,4 +1,4 @@
-"""Plain data that is checked when it is made, and what is wrong with it as a sentence."""
+"""Plain data classes with validation, and validation errors as sentences."""
 
 from reprlib import repr as shortened
 from typing import Any
@@ -8,7 +8,7 @@ from pydantic.fields import FieldInfo
 
 from radarize.io.schema import Described
 
-#: Of any number that somebody may set, in its unit.
+#: Upper limit of any numeric setting, in its unit.
 MOST = 1_000_000
 
 
@@ -51,8 +51,8 @@ def _extra(field: FieldInfo, name: str) -> str:
     return str(extra.get(name, "")) if isinstance(extra, dict) else ""
 
 
-def complaint(error: ValidationError) -> str:
-    """The first thing that is wrong: field, value, and what is expected."""
+def format_validation_error(error: ValidationError) -> str:
+    """Return the first error as text: field, value, and what is expected."""
     first = error.errors()[0]
     field = ".".join(map(str, first["loc"])) or "file"
     if first["type"] == "missing":

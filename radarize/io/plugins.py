@@ -1,4 +1,4 @@
-"""Parts that packages add by entry points: methods, trainings, formats, benchmarks."""
+"""Extensions that packages add by entry points: methods, trainings, formats, benchmarks."""
 
 from collections.abc import Iterator, MutableMapping
 from functools import cached_property
@@ -12,11 +12,11 @@ Part = TypeVar("Part")
 
 
 class Plugins(MutableMapping[str, Part], Generic[Part]):
-    """Parts by name: the entry points of a group, each imported at its first use, and what a program adds itself.
+    """Extensions by name: the entry points of a group, each imported at first use, and those added at run time.
 
     Args:
-        group: of entry points, in the ``pyproject.toml`` of any installed package.
-        what: the parts are called in errors.
+        group: group of entry points, in the ``pyproject.toml`` of any installed package.
+        what: name of such an extension in errors.
 
     Example:
         >>> Plugins("radarize.scans", "scans").find("first-eco")
@@ -33,10 +33,10 @@ class Plugins(MutableMapping[str, Part], Generic[Part]):
         return {point.name: point for point in entry_points(group=self.group)}
 
     def find(self, name: str) -> Part:
-        """Return a part.
+        """Return an extension.
 
         Raises:
-            InputError: no part has this name, or its module cannot be imported.
+            InputError: no extension has this name, or its module cannot be imported.
         """
         if not self._installed and not self._added:
             raise InputError(f"{self.what} {name}: no {self.group} is installed, expected radarize installed by pip")
@@ -63,7 +63,7 @@ class Plugins(MutableMapping[str, Part], Generic[Part]):
         return name in self._added or name in self._installed
 
     def __iter__(self) -> Iterator[str]:
-        """Names of what can be imported: folders of this package may be deleted."""
+        """Names of extensions that can be imported; folders of this package may be deleted."""
         there = {name for name, point in self._installed.items() if _exists(point.module)}
         return iter(sorted(there | self._added.keys()))
 
@@ -74,5 +74,5 @@ class Plugins(MutableMapping[str, Part], Generic[Part]):
 def _exists(module: str) -> bool:
     try:
         return find_spec(module) is not None
-    except ModuleNotFoundError:  # a folder above it
+    except ModuleNotFoundError:  # a parent package is missing
         return False

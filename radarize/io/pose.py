@@ -1,4 +1,4 @@
-"""Planar poses as arrays (..., 3): x m, y m, yaw rad. Leading axes broadcast. Below them, poses in space."""
+"""Planar poses as arrays (..., 3): x m, y m, yaw rad; leading axes broadcast. At the end, poses in space."""
 
 from typing import overload
 
@@ -22,12 +22,12 @@ def wrap(angle: np.ndarray) -> np.ndarray: ...
 
 
 def wrap(angle: np.ndarray | float) -> np.ndarray | float:
-    """Angle in [-pi, pi)."""
+    """Wrap an angle to [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def compose(a: Pose, b: Pose) -> Pose:
-    """Pose b, given in the frame of a, in the frame that a is given in."""
+    """Return pose b, given in the frame of a, in the frame that a is given in."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
     return np.stack(
@@ -41,25 +41,25 @@ def compose(a: Pose, b: Pose) -> Pose:
 
 
 def inverse(a: Pose) -> Pose:
-    """The pose that undoes a."""
+    """Return the inverse of a pose."""
     a = np.asarray(a, float)
     cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
     return np.stack([-cos * a[..., 0] - sin * a[..., 1], sin * a[..., 0] - cos * a[..., 1], wrap(-a[..., 2])], axis=-1)
 
 
 def between(a: Pose, b: Pose) -> Pose:
-    """Pose b seen from a: compose(a, between(a, b)) == b."""
+    """Return pose b relative to a: compose(a, between(a, b)) == b."""
     return compose(inverse(a), b)
 
 
 def transform(pose: Pose, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-    """Points of the pose's frame in the frame that the pose is given in."""
+    """Transform points from the frame of a pose to the frame that the pose is given in."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     return points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
 
 
 def adjoint(a: Pose) -> Float[np.ndarray, "*#batch 3 3"]:
-    """Matrix that carries a small motion (x, y, yaw) in the frame of a into the frame that a is given in."""
+    """Return the matrix that maps a small motion (x, y, yaw) in the frame of a to the frame that a is given in."""
     cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
     found = np.zeros((*a.shape, 3))
     found[..., 0, 0], found[..., 0, 1], found[..., 0, 2] = cos, -sin, a[..., 1]
@@ -69,13 +69,13 @@ def adjoint(a: Pose) -> Float[np.ndarray, "*#batch 3 3"]:
 
 
 def carried(covariance: Float[np.ndarray, "3 3"], motion: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Covariance of a pose in its own frame after an exact motion, in the frame at its end."""
+    """Return the covariance of a pose in its own frame after an exact motion, in the frame at the end of the motion."""
     back = adjoint(inverse(motion))
     return back @ covariance @ back.T
 
 
 def interpolate(a: Pose, b: Pose, fraction: np.ndarray | float) -> Pose:
-    """Pose at a fraction (0 gives a, 1 gives b) of the way, position on the straight line, heading the short way."""
+    """Interpolate between poses (fraction 0: a, 1: b), linearly in position, and in heading along the shorter arc."""
     share = np.asarray(fraction, float)
     position = a[..., :2] + share[..., None] * (b[..., :2] - a[..., :2])
     yaw = np.asarray(wrap(a[..., 2] + share * wrap(b[..., 2] - a[..., 2])))
@@ -83,7 +83,7 @@ def interpolate(a: Pose, b: Pose, fraction: np.ndarray | float) -> Pose:
 
 
 def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.ndarray, "3"]:
-    """Motion (x, y, yaw) of a body that moves by `translation` (m, in its own frame) while it turns: exp of SE(2)."""
+    """Return the motion (x, y, yaw) of a body that translates (m, in its own frame) while it turns: exp of SE(2)."""
     if abs(turn) < 1e-6:
         a, b = 1.0, turn / 2
     else:
@@ -92,12 +92,12 @@ def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.nd
     return np.array([a * x - b * y, b * x + a * y, turn])
 
 
-#: The pose x y z qx qy qz qw of what is where its frame of reference is.
+#: The identity pose x y z qx qy qz qw.
 NOWHERE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 
 
 def frame_between(here: Float[np.ndarray, "7"], there: Float[np.ndarray, "7"]) -> Float[np.ndarray, "7"]:
-    """Pose of the second's frame of reference in the first's, where both are poses of one body.
+    """Return the pose of the second frame of reference in the first, given the pose of one body in both.
 
     Example:
         >>> frame_between(NOWHERE, np.array([1.0, 2, 0, 0, 0, 0, 1]))[:3]

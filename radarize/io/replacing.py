@@ -1,4 +1,4 @@
-"""Files that are whole or not there."""
+"""Files and folders that appear under their name only when complete."""
 
 import contextlib
 import os
@@ -14,7 +14,8 @@ from radarize.io.locks import hold
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary name beside `path` to write to; it takes the path's place when the block ends, and goes if it fails.
+    """Yield a temporary path beside `path` to write to; it replaces `path` at the end of the block, or is deleted on
+    error.
 
     Raises:
         InputError: the file cannot be written.
@@ -36,14 +37,14 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def new_folder(path: str | Path, what: str = "export") -> Iterator[Path]:
-    """A folder to write to, which becomes `path` when the block ends, and goes if it fails.
+    """Yield a temporary folder to write to, which becomes `path` at the end of the block, and is deleted on error.
 
     Raises:
-        InputError: it is there already and not empty, or cannot be written.
+        InputError: the path exists and is not an empty folder, or cannot be written.
     """
     path = Path(path)
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
-        raise InputError(f"{path}: is there already, expected the name of a new folder for the {what}")
+        raise InputError(f"{path}: already exists, expected the name of a new folder for the {what}")
     with explained(f"{path}: cannot be written", OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=f"{path.name}.part") as folder:
@@ -53,18 +54,18 @@ def new_folder(path: str | Path, what: str = "export") -> Iterator[Path]:
 
 
 class Replacement:
-    """Files that take the places of those in a folder together, or not at all.
+    """Files that replace those in a folder together, or not at all.
 
     Args:
-        folder: where they go; made if need be.
-        names: of all files that there may be. The first goes first and comes last: where it is, so are the others, and
-            of one making.
+        folder: destination; created if needed.
+        names: names of all possible files. The first is removed first and written last: if it exists, the others are
+            complete and belong to it.
 
     Attributes:
-        part: folder to write them to.
+        part: temporary folder to write the files to.
 
     Raises:
-        InputError: nothing can be written there, or another program does.
+        InputError: the folder cannot be written, or another program writes it.
     """
 
     def __init__(self, folder: Path, names: Sequence[str]):
@@ -73,14 +74,14 @@ class Replacement:
         with explained(f"{folder}: cannot be written", OSError):
             self.part.mkdir(parents=True, exist_ok=True)
             self._held: int | None = hold(self.part)
-            for left in self.part.iterdir():  # of one who died here
+            for left in self.part.iterdir():  # of a process that died
                 left.unlink()
 
     def place(self) -> None:
-        """Let the files take their places; those of the folder that are not among them go.
+        """Move the files to their places; other files of `names` in the folder are deleted.
 
         Raises:
-            InputError: they cannot.
+            InputError: a file cannot be moved.
         """
         with explained(f"{self.folder}: cannot be written", OSError):
             for name in self.names:
@@ -91,7 +92,7 @@ class Replacement:
             self._let_go()
 
     def discard(self) -> None:
-        """Leave the folder as it was; nothing to do after `place`."""
+        """Leave the folder as it was; does nothing after `place`."""
         if self._held is not None:
             self._let_go()
             if self._new:
@@ -106,11 +107,11 @@ class Replacement:
 
 
 def write_whole(path: Path, text: str) -> Path:
-    """Write a text file under a temporary name and rename it when it is whole. Bytes of file names that are no UTF-8
-    stand in it as ``\\udcff``.
+    """Write a text file under a temporary name and rename it when complete. Bytes of file names that are not UTF-8 are
+    written as ``\\udcff``.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace")

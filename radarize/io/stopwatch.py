@@ -1,4 +1,4 @@
-"""How long steps take, wherever they are: `stage` names a step, the `Stopwatch` that runs takes its time."""
+"""Timing of steps: `stage` names a step, and the running `Stopwatch` measures its time."""
 
 import time
 from collections import defaultdict
@@ -10,10 +10,10 @@ _running: ContextVar["Stopwatch | None"] = ContextVar("running", default=None)
 
 
 class Stopwatch:
-    """Times the stages that are entered while it runs: ``with stopwatch.running(): ...``.
+    """Measures the time of stages entered while it runs: ``with stopwatch.running(): ...``.
 
     Attributes:
-        seconds: of each stage by name, without the stages within it.
+        seconds: time of each stage by name, without nested stages, s.
     """
 
     def __init__(self):
@@ -21,7 +21,7 @@ class Stopwatch:
 
     @contextmanager
     def running(self) -> Iterator["Stopwatch"]:
-        """Take the time of stages from now on, in this thread."""
+        """Measure stages from now on, in this thread."""
         before = _running.set(self)
         try:
             yield self
@@ -31,7 +31,7 @@ class Stopwatch:
 
 @contextmanager
 def stage(name: str) -> Iterator[None]:
-    """A step of the pipeline; what steps within it take is theirs. Without a stopwatch nothing is timed."""
+    """Mark a step of the pipeline; time in nested steps counts for these. Without a stopwatch nothing is measured."""
     watch = _running.get()
     if watch is None:
         yield

@@ -1,4 +1,4 @@
-"""A trajectory as a plain object of arrays: of the truth, of odometry, of SLAM."""
+"""A trajectory as an object of arrays: truth, odometry, or SLAM."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,11 +24,11 @@ class Trajectory:
     """Poses of the sensor over time.
 
     Attributes:
-        time: (pose,) s: the truth's stamps, else the middle of each frame's burst of chirps.
+        time: (pose,) s: stamps of the truth, or else the middle of each frame's burst of chirps.
         pose: (pose, 7) position in m and quaternion x y z w; x forward, y left, z up.
-        covariance: (pose, 3, 3) of each pose's x, y (m) and yaw (rad) in its own frame, given the first pose; None if
-            unknown.
-        velocity: (pose, 2 or 3) m/s in the sensor's frame: forward, left, perhaps up; None if unknown.
+        covariance: (pose, 3, 3) covariance of each pose's x, y (m) and yaw (rad) in its own frame, given the first
+            pose; None if unknown.
+        velocity: (pose, 2 or 3) m/s in the sensor frame: forward, left, possibly up; None if unknown.
         velocity_covariance: (pose, 2, 2) m^2/s^2; None if unknown.
         floor_plan: (segment, 4) walls of the place, x0 y0 x1 y1 in m; None if unknown.
         name: in plots.
@@ -58,36 +58,36 @@ class Trajectory:
 
     @cached_property
     def planar(self) -> Float[np.ndarray, "pose 3"]:
-        """(pose, 3) x, y in m and yaw in rad."""
+        """Planar poses (pose, 3): x, y in m and yaw in rad."""
         return planar(self.pose)
 
     @property
     def distance(self) -> float:
-        """Length of the way in the plane, m."""
+        """Length of the path in the plane, m."""
         return float(np.hypot(*np.diff(self.pose[:, :2], axis=0).T).sum())
 
     def where(self, chosen: Bool[np.ndarray, "pose"]) -> "Trajectory":
-        """The chosen poses alone."""
+        """Return the trajectory with the chosen poses only."""
         names = ("time", "pose", "covariance", "velocity", "velocity_covariance")
         known = {name: values[chosen] for name in names if (values := getattr(self, name)) is not None}
         return replace(self, **known)
 
     def to_tum(self, path: str | Path) -> Path:
-        """Write a TUM file: ``time x y z qx qy qz qw`` a line.
+        """Write a TUM file with lines ``time x y z qx qy qz qw``.
 
         Raises:
-            InputError: it cannot be written.
+            InputError: the file cannot be written.
         """
         return write_tum(path, self.time, self.pose)
 
     def to_evo(self) -> "PoseTrajectory3D":
-        """The trajectory of the `evo` package."""
+        """Return the trajectory as an object of the `evo` package."""
         from evo.core.trajectory import PoseTrajectory3D
 
         return PoseTrajectory3D(self.pose[:, :3], np.roll(self.pose[:, 3:], 1, axis=1), self.time)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A table with the time (s) as its index: x y z (m), qx qy qz qw, yaw (rad), and vx vy (m/s) where known."""
+        """Return a table with the time (s) as index: x y z (m), qx qy qz qw, yaw (rad), and vx vy (m/s) if known."""
         import pandas
 
         table = dict(zip(_COLUMNS, self.pose.T, strict=True)) | {"yaw": self.planar[:, 2]}
@@ -96,7 +96,8 @@ class Trajectory:
         return pandas.DataFrame(table, index=pandas.Index(self.time, name="time"))
 
     def plot(self, axes: "Axes | None" = None, **style: Any) -> "Axes":
-        """Draw it from above, in m, with the floor plan where that is known; `style` is that of matplotlib's lines."""
+        """Draw the trajectory from above, in m, with the floor plan if known; `style` is passed to matplotlib's
+        plot."""
         axes = axes_or_new(axes)
         if self.floor_plan is not None:
             for x0, y0, x1, y1 in self.floor_plan:

@@ -1,4 +1,4 @@
-"""TUM trajectory files: ``time x y z qx qy qz qw`` a line, ``#`` comments."""
+"""TUM trajectory files: lines of ``time x y z qx qy qz qw``, ``#`` comments."""
 
 from pathlib import Path
 from typing import TextIO
@@ -10,19 +10,20 @@ from radarize.io.errors import InputError
 from radarize.io.files import read_bytes
 from radarize.io.replacing import replacing
 
-#: Poses that are written at a time.
+#: Number of poses written at a time.
 _ROWS = 1024
-#: Bytes of a file: a day at 20 Hz.
+#: Maximum bytes of a file: a day at 20 Hz.
 _LARGEST = 256 << 20
-#: s and m, of stamps (also such as count from 1970) and positions.
+#: s and m, largest stamp (for stamps that count from 1970 too) and position.
 _LATEST, _FARTHEST = 1e11, 1e6
 
 
 def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
-    """Times (s) and poses (position m, unit quaternion x y z w) of a TUM file.
+    """Read times (s) and poses (position m, unit quaternion x y z w) from a TUM file.
 
     Raises:
-        InputError: naming the line: not eight finite numbers, times that do not ascend, or no unit quaternion.
+        InputError: a line without eight finite numbers, times that do not ascend, or no unit quaternion; names the
+            line.
     """
     lines = read_bytes(path, "poses (TUM)", _LARGEST).decode(errors="replace").splitlines()
     rows: list[list[float]] = []
@@ -38,7 +39,7 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
             raise InputError(
                 f"{path}, line {number}: is {line.strip()[:60]!r}, expected eight numbers: time x y z qx qy qz qw"
             )
-        if not np.abs(row).max() <= _LATEST or np.abs(row[1:4]).max() > _FARTHEST:  # also of what is no number
+        if not np.abs(row).max() <= _LATEST or np.abs(row[1:4]).max() > _FARTHEST:  # true for NaN too
             raise InputError(
                 f"{path}, line {number}: holds {' '.join(words)[:80]}, expected finite numbers, "
                 f"seconds within {_LATEST:g} and metres within {_FARTHEST:g}"
@@ -58,7 +59,7 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
 
 
 def write_tum(path: str | Path, times: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 7"]) -> Path:
-    """Write times (s) and poses (position m, quaternion x y z w), under a temporary name until whole.
+    """Write times (s) and poses (position m, quaternion x y z w) to a TUM file, which appears when complete.
 
     Raises:
         InputError: the file cannot be written.
@@ -69,20 +70,20 @@ def write_tum(path: str | Path, times: Float[np.ndarray, "pose"], poses: Float[n
 
 
 def write_poses(file: TextIO, times: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 7"]) -> None:
-    """Add lines to an open TUM file, see `write_tum`."""
+    """Append lines to an open TUM file, see `write_tum`."""
     for start in range(0, len(times), _ROWS):
         rows = slice(start, start + _ROWS)
         np.savetxt(file, np.column_stack([times[rows], poses[rows]]), fmt="%.9f")
 
 
 def planar(poses: Float[np.ndarray, "pose 7"]) -> Float[np.ndarray, "pose 3"]:
-    """Poses as x, y, yaw (m, rad): yaw is where the x axis, the boresight, points on the floor."""
+    """Project poses to x, y, yaw (m, rad): yaw is the direction of the x axis, the boresight, on the floor."""
     x, y, z, w = poses[:, 3:].T
     return np.column_stack([poses[:, :2], np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))])
 
 
 def planar_poses(poses: Float[np.ndarray, "pose 3"]) -> Float[np.ndarray, "pose 7"]:
-    """Poses x, y, yaw (m, rad) as position and quaternion, z = 0."""
+    """Convert poses x, y, yaw (m, rad) to position and quaternion, z = 0."""
     poses = np.asarray(poses, float)
     zero = np.zeros(len(poses))
     half = poses[:, 2] / 2

@@ -1,4 +1,4 @@
-"""YAML files that people write."""
+"""Safe reader of YAML files that people write."""
 
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -8,20 +8,20 @@ from pydantic import BaseModel, ValidationError
 
 from radarize.io.errors import InputError
 from radarize.io.files import read_text
-from radarize.io.plain import complaint
+from radarize.io.plain import format_validation_error
 
 Settings = TypeVar("Settings", bound=BaseModel)
-#: Bytes of a file, of which PyYAML makes some hundreds each; values in it, counted as often as aliases repeat them; how
-#: deep they nest, and the digits of a number.
+#: Maximum bytes of a file, each of which needs some hundred bytes of memory in PyYAML; maximum number of values,
+#: counted as often as aliases repeat them; maximum depth; maximum digits of a number.
 _BYTES, _VALUES, _DEPTH, _DIGITS = 2 << 20, 250_000, 32, 40
-_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, where PyYAML was built with it
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the implementation in C, if PyYAML has it
 
 
 def read_yaml(path: str | Path, most: int = _BYTES) -> object:
-    """What a YAML file holds, of at most so many bytes.
+    """Read a YAML file of at most `most` bytes.
 
     Raises:
-        InputError: the file cannot be read, is malformed, or holds more than anybody would write.
+        InputError: the file cannot be read, is malformed, or exceeds the limits.
     """
     text = read_text(path, "YAML", most)
     try:
@@ -31,13 +31,15 @@ def read_yaml(path: str | Path, most: int = _BYTES) -> object:
 
 
 def read_beside(module: str) -> dict[str, Any]:
-    """What the YAML file that comes with a module (its ``__file__``) and has its name holds, a mapping."""
+    """Return the mapping in the YAML file beside a module (its ``__file__``), of the same name."""
     return cast(dict[str, Any], read_yaml(Path(module).with_suffix(".yaml")))
 
 
 def _content(text: str) -> object:
     depth = 0
-    for count, event in enumerate(yaml.parse(text, _Loader)):  # composing recurses, and takes memory; this does not
+    for count, event in enumerate(
+        yaml.parse(text, _Loader)
+    ):  # unlike composing, parsing needs neither recursion nor memory
         if count > 2 * _VALUES:
             raise ValueError(f"it holds more than {_VALUES} values")
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
@@ -58,10 +60,10 @@ def _content(text: str) -> object:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """Values within a node, aliases followed, and how deep they nest.
+    """Return the number of values within a node, with aliases expanded, and their depth.
 
     Raises:
-        ValueError: it holds itself, or a number of too many digits.
+        ValueError: it contains itself, or a number of too many digits.
     """
     if isinstance(node, yaml.ScalarNode):
         if len(node.value) > _DIGITS and node.tag.endswith((":int", ":float")):
@@ -78,10 +80,10 @@ def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[
 
 
 def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settings:
-    """Settings with what a YAML file says otherwise: sections and fields named as there.
+    """Read settings from a YAML file, with sections and fields named as in the defaults, which fill what is missing.
 
     Args:
-        expected: what such a file holds, in words.
+        expected: description of such a file.
 
     Raises:
         InputError: no such file, or a field that does not exist or has an impossible value.
@@ -92,11 +94,11 @@ def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settin
     try:
         return type(defaults).model_validate(changed(defaults, changes))
     except ValidationError as error:
-        raise InputError(f"{path}: {complaint(error)}") from error
+        raise InputError(f"{path}: {format_validation_error(error)}") from error
 
 
 def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object]:
-    """The fields of settings, with some of them changed: those of settings within settings, too, however deep."""
+    """Return the fields of settings with some of them changed, also in nested settings."""
     within = {
         name: changed(part, change)
         for name, change in changes.items()

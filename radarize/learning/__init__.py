@@ -1,2 +1,2 @@
-"""Networks: `features` (what they see), `nets` (what they are), `training`, `task` (what a training needs to know), and
-the shipped `weights`."""
+"""Networks: their input (`features`), their architectures (`nets`), `training`, the definition of a training (`task`),
+and the shipped `weights`."""

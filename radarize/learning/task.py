@@ -1,4 +1,4 @@
-"""What a training needs to know of a network: what it sees, its labels, its loss, its hyper-parameters."""
+"""Definition of a network's training: inputs, labels, loss, hyper-parameters."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
@@ -17,24 +17,24 @@ from radarize.learning.nets.gaussian import Gaussian
 from radarize.learning.nets.weights import Header, Network, build
 from radarize.signal.maps import Maps
 
-#: What a network reads of items: one tensor, or several.
+#: Inputs of a network: one tensor, or several.
 Inputs = TypeVar("Inputs", Tensor, tuple[Tensor, ...])
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Hyper-parameters.
+    """Hyper-parameters of a training.
 
     Attributes:
-        width: of the network; the paper's is 64.
-        frames: of a window.
-        epochs, batch, rate, betas: of Adam; a batch is what all processes take together.
-        schedule: of the rate: ``plateau``, or ``cosine``, which warms up and then falls to nothing in the last epoch:
-            as good in a third of the epochs; or ``steps``: to three quarters every 25 epochs.
-        plateau: epochs without a better validation loss after which the rate halves.
-        patience: such epochs after which training ends.
-        precision: of convolutions, ``float32`` or ``bfloat16``.
-        seed: of weights, order and augmentation.
+        width: width of the network; 64 in the paper.
+        frames: number of frames of a window.
+        epochs, batch, rate, betas: of Adam; the batch is divided among all processes.
+        schedule: schedule of the learning rate: ``plateau``; ``cosine``, with warm-up and decay to zero in the last
+            epoch, equally good in a third of the epochs; or ``steps``: times 0.75 every 25 epochs.
+        plateau: epochs without lower validation loss after which the rate halves.
+        patience: epochs without lower validation loss after which training ends.
+        precision: precision of convolutions, ``float32`` or ``bfloat16``.
+        seed: seed of initial weights, order and augmentation.
     """
 
     width: int = 16
@@ -51,21 +51,21 @@ class Settings:
 
 
 class Task(ABC, Generic[Inputs]):
-    """What the trainer needs to know of a network's task.
+    """Definition of a network's training.
 
     Attributes:
         network: class of the network.
-        maps: that its network reads.
-        sensed: what else it reads.
-        truth: that its labels are made of.
-        share: of all windows, which an epoch takes, drawn anew each time: neighbours among long ones are nearly alike.
-        reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
-            farthest is what is validated.
-        least_frames: of a window, for what it estimates.
-        optimiser: algorithm.
-        steepest: norm of the gradient from which it is cut; most are about as large. A likelihood has no bounds: a
-            single item that a network is wrongly sure of would undo many steps.
-        defaults: settings.
+        maps: maps that are its input.
+        sensed: other inputs.
+        truth: truth from which labels are computed.
+        share: share of all windows in an epoch, drawn anew each time; neighbouring windows of long walks are similar.
+        reach: maximum time between frames of a window, s; None: consecutive frames. Drawn per item; validation uses the
+            maximum.
+        least_frames: minimum number of frames of a window.
+        optimiser: class of the optimiser.
+        steepest: norm to which gradients are clipped; most are about as large. Likelihood is unbounded: one item with a
+            large error and a small estimated variance would undo many steps.
+        defaults: default hyper-parameters.
     """
 
     network: type[Network]
@@ -81,18 +81,18 @@ class Task(ABC, Generic[Inputs]):
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """All that its network reads of a frame."""
+        """Names of all inputs from a frame."""
         return (*self.maps, *(reading.name for reading in self.sensed))
 
     def header(self, settings: Settings, grid: MapGrid | None, **about: Any) -> Header:
-        """What its weights' file says; see `Header` for what else to say."""
+        """Return the header of its file of weights; see `Header` for `about`."""
         return Header(
             kind=self.network.kind, setting=self.network.setting, frames=settings.frames, maps=self.reads,
             width=settings.width, grid=grid, seed=settings.seed, **about,
         )  # fmt: skip
 
     def net(self, settings: Settings, grid: MapGrid | None) -> Network:
-        """A network for maps of a grid, if it reads any, with random weights from torch's generator."""
+        """Return a network for maps of a grid, with random weights from torch's generator."""
         return build(self.network, self.header(settings, grid))
 
     def table(
@@ -102,64 +102,64 @@ class Task(ABC, Generic[Inputs]):
         progress: Callable[..., None] = lambda *where: None,
         grid: MapGrid | None = None,
     ) -> FeatureTable:
-        """All that it reads of recordings, see `FeatureTable.read`."""
+        """Read all inputs and truth from recordings, see `FeatureTable.read`."""
         return FeatureTable.read(paths, self.maps, self.truth, self.sensed, self.network.maker, workers, progress, grid)
 
     def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
-        """The algorithm, at work."""
+        """Return the optimiser."""
         return self.optimiser(parameters, settings.rate, settings.betas)
 
     def spacings(self, frame_period: float) -> Sequence[int]:
-        """Frames from one of a window to the next, for frames that come every `frame_period` (s)."""
+        """Return the spacings between frames of a window, for a frame period (s)."""
         return range(1, 2 if self.reach is None else max(2, round(self.reach / frame_period) + 1))
 
     def frames(
         self, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
     ) -> Int[Tensor, "item frame"]:
-        """Frames of windows."""
+        """Return the frames of windows."""
         return starts[:, None] + spacing[:, None] * torch.arange(count)
 
     def inputs(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Inputs:
-        """What the network reads of windows."""
-        return cast(Inputs, table.window(frames))  # tasks that read several tensors have their own
+        """Return the network's inputs for windows."""
+        return cast(Inputs, table.window(frames))  # overridden by tasks with several inputs
 
     def label(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Tensor:
-        """What the network should say of windows."""
+        """Return the expected output for windows."""
         return table.truth[self.truth[0].name][frames[:, -1]]
 
     def items(
         self, table: FeatureTable, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
     ) -> tuple[Inputs, Tensor]:
-        """What the network reads of windows of so many frames, and what it should say."""
+        """Return inputs and expected output for windows of `count` frames."""
         frames = self.frames(starts, spacing, count)
         return self.inputs(table, frames), self.label(table, frames)
 
     @abstractmethod
     def augment(self, maps: Inputs, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:
-        """Items as they might as well have been."""
+        """Return randomly changed items of equal probability."""
 
     @abstractmethod
     def loss(self, net: nn.Module, maps: Inputs, label: Tensor) -> Float[Tensor, "item"]:
-        """What training makes small; calls the network once."""
+        """Return the loss, calling the network once."""
 
     @abstractmethod
     def judge(self, net: Network, maps: Inputs, label: Tensor) -> Float[Tensor, "item number"]:
-        """Of what `estimate` says of each item: the validation loss, then what `metrics` needs."""
+        """Evaluate `estimate` per item: validation loss, then the numbers that `metrics` needs."""
 
     @abstractmethod
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
-        """Names and values, from the means of what `judge` says."""
+        """Return metrics by name, from the means of the numbers from `judge`."""
 
     @abstractmethod
     def calibrate(self, net: Network, batches: Iterable[tuple[Inputs, Tensor]]) -> None:
-        """Make a trained network's uncertainty honest on validation data, which is gone through once."""
+        """Calibrate a trained network's uncertainty on validation data, which is iterated once."""
 
 
 class Motion(Task[Tensor]):
-    """Velocity or turn.
+    """Base class for velocity and rotation.
 
     Attributes:
-        error, size: what the log calls the error and the size of what is told, RMS.
+        error, size: names of the RMS error and of the RMS true value in the log.
     """
 
     error: str
@@ -193,22 +193,22 @@ class Motion(Task[Tensor]):
 
 
 def turns(table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
-    """Change of yaw from the first frame of windows to the last, rad."""
+    """Return the change of yaw from the first frame of windows to the last, rad."""
     yaw = table.truth["yaw"]
     return torch.remainder(yaw[frames[:, -1]] - yaw[frames[:, 0]] + torch.pi, 2 * torch.pi) - torch.pi
 
 
 def first_cell(cells: Tensor) -> Int[Tensor, "item bearing"]:
-    """Range bin of the first true cell per bearing; the number of bins where there is none."""
+    """Return the range bin of the first true cell per bearing; the number of bins if there is none."""
     return torch.where(cells.any(dim=1), cells.int().argmax(dim=1), cells.shape[1])
 
 
-#: Trainings by the kind of network: entry points of the group ``radarize.tasks``, classes without arguments.
+#: Trainings by kind of network: entry points of the group ``radarize.tasks``, classes without arguments.
 TASKS: Plugins[type[Task]] = Plugins("radarize.tasks", "task")
 
 
 def find_task(kind: str) -> Task:
-    """Return a network's training.
+    """Return the training of a network.
 
     Raises:
         InputError: there is none of this name.

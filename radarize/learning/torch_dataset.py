@@ -1,4 +1,4 @@
-"""Recordings for a training loop of one's own."""
+"""Torch data sets of recordings, for a user's own training loop."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,22 +19,23 @@ def torch_dataset(
 ) -> FrameDataset:
     """Read recordings as a torch `Dataset`, lazily, from any number of processes.
 
-    Maps are in dB of squared ADC counts, 80 azimuths from -59.25 to 59.25 deg to the left; what each axis means, and
-    what the shipped networks divide by, is in `radarize.learning.training.dataset`, the numbers in the result's `axes`.
+    Maps are in dB of squared ADC counts, at 80 azimuths from -59.25 to 59.25 deg to the left. The axes, and the scaling
+    of the shipped networks, are described in `radarize.learning.training.dataset`; the result's `axes` has their
+    values.
 
     Args:
-        data: a recording, several, or a folder of them, such as ``radarsim dataset`` makes.
+        data: a recording, several, or a folder of them, such as from ``radarsim dataset``.
         features: maps of `radarize.signal.maps.MAPS` (float32, dB), ``adc`` (int16 samples), ``time`` (s, float64).
-        labels: truth: ``velocity`` (m/s), ``turn`` (rad from frame to frame), ``pose``, ``scan`` (m), ``depth`` (mm),
+        labels: truth: ``velocity`` (m/s), ``turn`` (rad between frames), ``pose``, ``scan`` (m), ``depth`` (mm),
             ``occupancy``.
-        split, part: of the data set's specification: such as ``random-0`` and ``train``, ``validation`` or ``test``;
-            all recordings without a split.
-        window: frames of an item.
-        stride: frames from one item's start to the next one's.
-        cache: keep maps in memory once they are made, in each worker process.
+        split, part: split of the data set's specification, such as ``random-0``, and its part ``train``, ``validation``
+            or ``test``; all recordings without a split.
+        window: number of frames of an item.
+        stride: frames between the starts of consecutive items.
+        cache: keep computed maps in memory, in each worker process.
 
     Returns:
-        Items are dictionaries of tensors by name, the window's frames along the first axis.
+        A data set whose items are dictionaries of tensors by name, with the window's frames along the first axis.
 
     Raises:
         InputError: no recordings, an unknown name or split, or truth that a recording lacks.

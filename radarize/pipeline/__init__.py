@@ -1,2 +1,2 @@
-"""The algorithm and how it is run. `pipeline` is the algorithm; `methods` are its parts by name; `config` has every
-number that may be set; `session` runs it on a recording; `runfolder` is what a run leaves."""
+"""The algorithm and how it is run: `pipeline` has its steps, `methods` their implementations by name, `config` all
+settings, `session` a run on a recording, `runfolder` the files of a run."""

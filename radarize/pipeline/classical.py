@@ -1,4 +1,4 @@
-"""Methods without networks, for any radar: Doppler least squares and a local map; echoes of Capon's heat map."""
+"""Methods without networks, for any radar: Doppler least squares with map matching; echoes in Capon heat maps."""
 
 from functools import partial
 
@@ -10,14 +10,14 @@ from radarize.scans.extraction import HeatmapScans
 
 
 def doppler(inputs: Inputs) -> Odometry:
-    """Least squares over Doppler peaks, and matching against a local map."""
+    """Make odometry from least squares over Doppler peaks and from matching against a local map."""
     settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
     velocity, rotation = DopplerVelocity(heatmaps, settings.doppler), MapRotation(heatmaps, settings.rotation)
     return Odometry(inputs.radar, velocity, rotation, settings.velocity)
 
 
 def scans(inputs: Inputs, method: str) -> HeatmapScans:
-    """Echoes of heat maps, by a key of `radarize.scans.extraction.METHODS`."""
+    """Make scans from the echoes in heat maps, by a key of `radarize.scans.extraction.METHODS`."""
     return HeatmapScans(inputs.signal.heatmaps, method, inputs.configuration.scans)
 
 

@@ -1,4 +1,4 @@
-"""Makes the graphs that `radarize.learning.nets.compiled` runs: ``python -m radarize.pipeline.graphs``."""
+"""Write the ONNX graphs that `radarize.learning.nets.compiled` runs: ``python -m radarize.pipeline.graphs``."""
 
 from radarize.learning.nets.compiled import GRAPHS, graph_of
 from radarize.learning.nets.export import export_graph
@@ -7,7 +7,7 @@ from radarize.learning.task import find_task
 from radarize.pipeline.method import Weights
 from radarize.pipeline.methods import BEST, ODOMETRY, SCANS
 
-#: Networks of the methods of choice.
+#: Networks of the default methods.
 KINDS = (*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)
 
 

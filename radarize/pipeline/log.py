@@ -1,4 +1,4 @@
-"""Plain files in and out: scans and odometry of any sensor, and the folder that a session leaves behind."""
+"""SLAM on plain files: scans and odometry of any sensor in, a run folder out."""
 
 from collections import deque
 from collections.abc import Callable
@@ -17,20 +17,20 @@ from radarize.pipeline.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 
-#: Of a ``.npz``; times need not be there.
+#: Arrays of the ``.npz``; times are optional.
 _FIELDS = ("ranges", "angle_min", "angle_increment", "range_max", "times")
 
 
 @dataclass(frozen=True)
 class Log:
-    """Scans, and odometry if there is any.
+    """Scans of any sensor, with odometry if available.
 
     Attributes:
-        times: of scans, s, in any order.
-        azimuths: of the beams, rad, positive to the left.
-        ranges: m; inf: nothing seen; nan: not known.
-        odometry_times, odometry: s; x, y (m) and yaw (rad).
-        errors: of the odometry's steps; None: not known.
+        times: times of the scans, s, in any order.
+        azimuths: azimuths of the beams, rad, positive to the left.
+        ranges: m; inf: no echo; nan: unknown.
+        odometry_times, odometry: times, s, and poses: x, y (m) and yaw (rad).
+        errors: error model of the odometry's steps; None if unknown.
     """
 
     times: Float[np.ndarray, "scan"]
@@ -42,16 +42,16 @@ class Log:
 
     @classmethod
     def read(cls, scans: Path, odometry: Path | None = None) -> "Log":
-        """Read a log.
+        """Read scans and odometry from files.
 
         Args:
-            scans: a ``.npz`` with ``ranges`` (scan, beam) in m, ``range_max`` in m (that much or more: nothing seen),
-                ``angle_min`` and ``angle_increment`` in rad (positive to the left), and ``times`` (scan,) in s; without
-                times scan i was taken at second i. Or the folder of a run, whose ``scans.h5`` is taken.
-            odometry: TUM file. Of a run's folder its ``odometry.tum`` by default.
+            scans: a ``.npz`` with ``ranges`` (scan, beam) in m, ``range_max`` in m (ranges from there on mean no
+                echo), ``angle_min`` and ``angle_increment`` in rad (positive to the left), and ``times`` (scan,) in
+                s; without times, scan i has the time i s. Or a run folder, whose ``scans.h5`` is read.
+            odometry: TUM file; by default the ``odometry.tum`` of a run folder.
 
         Raises:
-            InputError: a file or field is missing or is not as described.
+            InputError: a file or field is missing or malformed.
         """
         scans, moved, errors = Path(scans), odometry and read_tum(odometry), None
         if scans.is_dir():
@@ -67,11 +67,12 @@ class Log:
             return cls(times, azimuths, ranges, np.zeros(0), np.zeros((0, 3)))
         stamps, poses = moved
         if errors is not None and len(errors) != len(stamps):
-            errors = None  # the odometry is another one
+            errors = None  # they belong to other odometry
         return cls(times, azimuths, ranges, stamps, planar(poses), errors)
 
     def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
-        """Give everything to a new session, in order of time, and finish it; `progress` takes scans done and in all."""
+        """Add all scans and odometry to a new session in order of time and finish it; call `progress` with (done,
+        total)."""
         errors = self.errors if self.errors is not None else [None] * len(self.odometry_times)
         odometry = deque(zip(self.odometry_times, self.odometry, errors, strict=True))
         for done, i in enumerate(np.argsort(self.times, kind="stable"), 1):
@@ -93,14 +94,15 @@ def run(
     reference: Path | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """SLAM on plain files.
+    """Run SLAM on plain files.
 
     Args:
         scans, odometry: as in `Log.read`.
-        output: folder to write: trajectory.tum (a pose for every scan), odometry.tum, map.pgm and map.yaml, scans.h5,
-            run.json, and reference.tum if there is one: what `radarize evaluate` and `radarize report` read.
-        config: of the back end.
-        reference: TUM file of true poses; of a run's folder its ``reference.tum`` by default.
+        output: folder to write: trajectory.tum (a pose for every scan), odometry.tum, map.pgm and map.yaml,
+            scans.h5, run.json, and reference.tum if there is a reference. `radarize evaluate` and `radarize report`
+            read it.
+        config: settings of the back end.
+        reference: TUM file of true poses; by default the ``reference.tum`` of a run folder.
         progress: called with (scans done, scans in all).
 
     Raises:
@@ -108,7 +110,7 @@ def run(
     """
     scans, output = Path(scans), Path(output)
     if scans.is_dir() and output.resolve() == scans.resolve():
-        raise InputError(f"{output}: is the run to be read, expected another folder to write")
+        raise InputError(f"{output}: is the input run, expected another folder to write")
     log, truth = Log.read(scans, odometry), None if reference is None else read_tum(reference)
     source = RunFolder(scans) if scans.is_dir() else None
     if truth is None and source is not None:
@@ -146,6 +148,6 @@ def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     times = found.get("times", np.arange(float(len(ranges))))
     if times.shape != ranges.shape[:1] or not np.isfinite(times).all():
         raise InputError(f"{path}: times has shape {times.shape}, expected {ranges.shape[:1]} finite seconds")
-    with np.errstate(over="ignore"):  # refused where they are used
+    with np.errstate(over="ignore"):  # rejected where they are used
         azimuths = found["angle_min"].item() + found["angle_increment"].item() * np.arange(ranges.shape[1])
     return times, azimuths, np.where(ranges >= found["range_max"].item(), np.inf, ranges)

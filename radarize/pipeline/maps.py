@@ -1,4 +1,4 @@
-"""Heat maps of frames, with named axes."""
+"""Heat maps of frames as `xarray` arrays with named axes."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -23,17 +23,18 @@ def range_azimuth(
     """Compute range-azimuth maps: power over range and azimuth, summed over Doppler.
 
     Args:
-        frames: of a recording, such as ``rec[100:110]`` or ``rec[100]``; a recording for all of its frames.
-        method: beamformer: ``"bartlett"`` (Taylor-windowed sum over the longest row of antennas), ``"capon"`` (minimum
-            variance, sharper), or ``"elevation-aware"`` (pairs of antennas that weaken ceiling and floor).
+        frames: frames of a recording, such as ``rec[100:110]`` or ``rec[100]``; a recording for all of its frames.
+        method: beamformer, ``"bartlett"`` (Taylor-windowed sum over the longest row of antennas), ``"capon"`` (minimum
+            variance, sharper), or ``"elevation-aware"`` (pairs of antennas that attenuate ceiling and floor).
         azimuths: rad, positive to the left; -60 to 60 deg in steps of 1 deg if None.
 
     Returns:
-        (frame, range, azimuth), without the axis of frames for a single frame; squared ADC counts, an echo of amplitude
-        A reads A^2. Coordinates: ``range`` m, ``azimuth`` rad, ascending, positive to the left, ``time`` s.
+        (frame, range, azimuth), without the axis of frames for a single frame; squared ADC counts: an echo of
+        amplitude A has the value A^2. Coordinates: ``range`` m, ``azimuth`` rad, ascending, positive to the left,
+        ``time`` s.
 
     Raises:
-        InputError: a recording without samples, or an array without such antennas.
+        InputError: a recording without samples, or an array without the antennas that the method needs.
 
     Example:
         >>> maps = rz.range_azimuth(rec[4:8])
@@ -62,13 +63,13 @@ def doppler_azimuth(
 ) -> xarray.DataArray:
     """Compute Doppler-azimuth maps: power over closing speed and azimuth, summed over range.
 
-    A static world that a radar of velocity v in direction theta sees lies at v cos(azimuth - theta).
+    A static world seen by a radar that moves with speed v in direction theta lies at v cos(azimuth - theta).
 
     Args:
         frames, method, azimuths: see `range_azimuth`.
         limited: limit the amplitude of each cell of the spectrum first, so that specular reflections do not hide the
             rest. With ``method="capon"`` and the azimuths of `radarize.signal.maps.AZIMUTHS` this is the map of that
-            name that networks and `rz.torch_dataset` see, there in dB.
+            name that is the input of networks and of `rz.torch_dataset`, there in dB.
 
     Returns:
         (frame, doppler, azimuth), without the axis of frames for a single frame; squared ADC counts. Coordinates:

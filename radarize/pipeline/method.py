@@ -1,4 +1,4 @@
-"""What a method is, and what it is made from."""
+"""A method of odometry or scans, and the inputs that it is made from."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ SHIPPED = Path(__file__).parents[1] / "learning" / "weights"
 
 
 class Weights:
-    """Where the networks' weights lie.
+    """Files of network weights.
 
     Args:
         folder: with ``translation.safetensors`` and so on, as `radarize train` writes them; the shipped ones if None.
@@ -27,20 +27,20 @@ class Weights:
         self.folder = None if folder is None else Path(folder)
 
     def of(self, kind: str) -> Path:
-        """File of a network."""
+        """Return the weights file of a network."""
         return (self.folder or SHIPPED) / f"{kind}.safetensors"
 
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What methods are made from.
+    """Inputs that methods are made from.
 
     Attributes:
-        delivered: configuration of the radar.
-        configuration: of the pipeline.
-        weights: of the networks.
-        recording: where other sensors' streams are; None on a live radar.
-        every: every so many-th frame is used.
+        delivered: configuration of the radar as it delivers frames.
+        configuration: settings of the pipeline.
+        weights: weights of the networks.
+        recording: source of the streams of other sensors; None for a live radar.
+        every: use every N-th frame.
     """
 
     delivered: RadarConfig
@@ -51,19 +51,19 @@ class Inputs:
 
     @cached_property
     def radar(self) -> RadarConfig:
-        """Of a radar that delivers no more frames than are used."""
+        """Configuration of the radar with the frame period of the frames that are used."""
         return self.delivered.every(self.every)
 
     @cached_property
     def signal(self) -> Signal:
-        """What makes spectra, maps and points of the radar's frames."""
+        """Signal processing of the frames that are used: spectra, maps and points."""
         return Signal(self.radar, self.configuration.heatmaps)
 
     def imu(self, method: str) -> Recording:
-        """The recording, for a method that needs its IMU.
+        """Return the recording, for a method that needs its IMU.
 
         Raises:
-            InputError: there is none.
+            InputError: the radar is live.
         """
         if self.recording is None:
             raise InputError(f"odometry is {method!r}, which reads a recording's IMU; a live radar has none")
@@ -72,15 +72,16 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to odometry or scans.
+    """A method of odometry or of scans.
 
     Attributes:
-        title: what tables call it.
-        make: called with `Inputs`; raises InputError where something is lacking, such as weights for this radar or a
+        title: name in tables.
+        make: called with `Inputs`; raises InputError if something is missing, such as weights for this radar or a
             stream.
         networks: kinds of weights that it needs.
-        whole: those of them that it needs where the array is whole (`radarize.radar.array.is_whole`); all if None.
-        scans: this odometry is made from scans (`Batch.ranges`).
+        whole: the kinds that it needs if the array is whole (`radarize.radar.array.is_whole`); None: all of
+            `networks`.
+        scans: this odometry is computed from scans (`Batch.ranges`).
         pictures: it reads polar pictures (`radarize.signal.polar`), so it needs no samples.
     """
 
@@ -92,5 +93,5 @@ class Method:
     pictures: bool = False
 
     def needed(self, radar: RadarConfig) -> tuple[str, ...]:
-        """Kinds of weights that it needs for a radar."""
+        """Return the kinds of weights that it needs for a radar."""
         return self.networks if self.whole is None or not is_whole(radar) else self.whole

@@ -1,8 +1,8 @@
-"""Methods of odometry and of scans by name, and the pipelines made of them: what ``--odometry`` and ``--scans`` accept
-and benchmarks compare.
+"""Methods of odometry and of scans by name, and the pipelines made of them: the values of ``--odometry`` and
+``--scans`` and of benchmarks.
 
 A method is an entry point of the group ``radarize.odometry`` or ``radarize.scans`` in the ``pyproject.toml`` of this or
-any other package; its value is a `Method`. A program may also add one itself: ``SCANS["mine"] = Method(...)``.
+any other package; its value is a `Method`. A program may also add one at run time: ``SCANS["mine"] = Method(...)``.
 """
 
 from radarize.io.errors import InputError
@@ -15,48 +15,48 @@ from radarize.signal.polar import pictured
 
 ODOMETRY: Plugins[Method] = Plugins("radarize.odometry", "odometry")
 SCANS: Plugins[Method] = Plugins("radarize.scans", "scans")
-#: Methods of choice.
+#: Default methods.
 BEST = {"odometry": "fused", "scans": "segmentation"}
-#: Methods without networks, for radars that the shipped ones do not fit.
+#: Default methods for radars that the shipped networks do not fit.
 CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
-#: Methods for recordings of pictures.
+#: Default methods for recordings of polar pictures.
 PICTURED = {"odometry": "pictures", "scans": "pictures"}
 
 
 def make_odometry(inputs: Inputs, name: str) -> OdometryEstimator:
-    """Make odometry by a key of `ODOMETRY`.
+    """Make odometry by its name in `ODOMETRY`.
 
     Raises:
-        InputError: unknown name, or see `Method`.
+        InputError: unknown name, or the method lacks something, see `Method`.
     """
     return _readable(ODOMETRY, name, inputs).make(inputs)
 
 
 def make_scans(inputs: Inputs, name: str) -> ScanExtractor:
-    """Make an extractor of scans by a key of `SCANS`.
+    """Make an extractor of scans by its name in `SCANS`.
 
     Raises:
-        InputError: unknown name, or see `Method`.
+        InputError: unknown name, or the method lacks something, see `Method`.
     """
     return _readable(SCANS, name, inputs).make(inputs)
 
 
 def make_pipeline(inputs: Inputs, odometry: str, scans: str, endless: bool = False) -> Pipeline:
-    """Make a pipeline by the names of its methods.
+    """Make a pipeline from the names of its methods.
 
     Args:
-        inputs: what methods are made from.
+        inputs: inputs of the methods.
         odometry, scans: keys of `ODOMETRY` and `SCANS`.
-        endless: as of `radarize.slam.backend.Slam`.
+        endless: see `radarize.slam.backend.Slam`.
 
     Raises:
-        InputError: unknown name, or see `Method`.
+        InputError: unknown name, or a method lacks something, see `Method`.
     """
     return Pipeline(make_odometry(inputs, odometry), make_scans(inputs, scans), inputs.configuration.slam, endless)
 
 
 def _readable(known: Plugins[Method], name: str, inputs: Inputs) -> Method:
-    """The method, if it can read the recording."""
+    """Return the method, if it can read the recording."""
     recording, method, what = inputs.recording, known.find(name), known.what
     if recording is not None and not recording.has_samples and not (method.pictures or method.scans):
         wanted = f"{what} {PICTURED[what]}" if pictured(recording) else "a recording with /radar/adc"
@@ -72,20 +72,20 @@ def choose_methods(
     own_weights: bool = False,
     pictures: bool = False,
 ) -> tuple[dict[str, str], str]:
-    """Methods by what they are for, those of choice where none is named; and why these have no networks, if so.
+    """Return odometry and scans by name, with defaults for what is not given, and why the defaults have no networks.
 
     Args:
-        radar: configuration.
+        radar: configuration of the radar.
         odometry, scans: names, if given.
-        own_weights: networks are the user's, so the shipped ones need not fit the radar.
-        pictures: the recording holds pictures and no samples.
+        own_weights: the networks are the user's, so the shipped ones need not fit the radar.
+        pictures: the recording has polar pictures instead of samples.
     """
     best, why = (PICTURED, "") if pictures else (BEST, "") if own_weights else best_methods(radar)
     return {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}, why
 
 
 def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
-    """Odometry and scans of choice for a radar, and where these are classical ones, why."""
+    """Return the default odometry and scans for a radar, and why they are classical ones if they are."""
     chosen, why, weights = dict(BEST), [], Weights()
     for what, known in (("odometry", ODOMETRY), ("scans", SCANS)):
         try:
@@ -98,13 +98,15 @@ def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
 
 
 def pace(odometry: str, radar: RadarConfig) -> int:
-    """Every N-th frame is enough for odometry: a network of turns was trained at a frame rate of its own, and odometry
-    with it is no better where frames come more often. Without one, every frame counts.
+    """Return N such that odometry needs every N-th frame only.
+
+    A network for rotation is trained at one frame rate, and a higher rate does not improve odometry with it. Without
+    such a network all frames are used.
 
     Raises:
         InputError: unknown name.
     """
     if "rotation" not in ODOMETRY.find(odometry).networks:
         return 1
-    taught = header_of(Weights().of("rotation")).grid
-    return max(1, int(taught.frame_period / radar.frame_period * (1 + 1e-3))) if taught else 1
+    trained = header_of(Weights().of("rotation")).grid
+    return max(1, int(trained.frame_period / radar.frame_period * (1 + 1e-3))) if trained else 1

@@ -1,4 +1,4 @@
-"""Odometry of a recording."""
+"""Odometry of a recording, without SLAM."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,20 +27,20 @@ def estimate_odometry(
     config: Configuration | str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trajectory:
-    """Estimate how the radar moved, frame by frame, without loop closure. ``rz.odometry`` is the same.
+    """Estimate the motion of the radar frame by frame, without loop closure. ``rz.odometry`` is the same function.
 
     Args:
-        frames: of a recording: ``rec``, a part of it ``rec[100:400]``, or every second frame ``rec[::2]``.
-        method: a name of ``radarize run --odometry``, such as ``"fused"`` or ``"doppler"``; by default networks where
+        frames: frames of a recording: ``rec``, a part of it ``rec[100:400]``, or every second frame ``rec[::2]``.
+        method: a value of ``radarize run --odometry``, such as ``"fused"`` or ``"doppler"``; by default networks if
             they fit the radar, else ``"doppler"``, which has none.
-        scans: method of the scans, for an odometry that is made from scans.
-        weights: folder of the networks' weights; by default the shipped ones.
-        config: settings of the pipeline, or a YAML file of them (``radarize config`` prints all).
+        scans: method of the scans, for odometry that is computed from scans.
+        weights: folder with network weights; by default the shipped ones.
+        config: pipeline settings, or a YAML file of them (``radarize config`` prints all).
         progress: called with (frames done, frames in all).
 
     Returns:
-        Poses at the frames' burst centres from the origin on, with velocities and covariances. Frames that were lost
-        are left out.
+        Poses at the frames' burst centres, starting at the origin, with velocities and covariances. Lost frames are
+        left out.
 
     Raises:
         InputError: a recording without frames, an unknown method, or one that lacks weights, samples or an IMU.
@@ -70,10 +70,10 @@ def estimate_odometry(
 
 
 def configuration(config: Configuration | str | Path | None) -> Configuration:
-    """Settings of the pipeline.
+    """Return settings of the pipeline, from a file if a path is given.
 
     Raises:
-        InputError: a file of them is missing or wrong.
+        InputError: the file is missing or malformed.
     """
     if config is None or isinstance(config, Configuration):
         return config or Configuration()
@@ -81,7 +81,7 @@ def configuration(config: Configuration | str | Path | None) -> Configuration:
 
 
 def trajectory(tracks: list[Track]) -> Trajectory:
-    """Tracks of consecutive batches as one."""
+    """Join tracks of consecutive batches to one trajectory."""
 
     def joined(name: str) -> np.ndarray:
         return np.concatenate([getattr(track, name) for track in tracks])

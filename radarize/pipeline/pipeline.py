@@ -1,10 +1,10 @@
-"""From raw I/Q to trajectory and map: the whole of Radarize, batch by batch.
+"""The whole of Radarize, from raw I/Q to trajectory and map, batch by batch.
 
-    samples -> Batch (spectra, maps, points, made when asked for) -> odometry -> SLAM -> trajectory
-                                                                  -> scans    ->      -> map
+    samples -> Batch (spectra, maps, points, computed on demand) -> odometry -> SLAM -> trajectory
+                                                                 -> scans    ->      -> map
 
-Methods of odometry and of scans come from `radarize.pipeline.methods`; what a batch gave is a `Result`, which goes to a
-sink: a run's folder, the live page, or memory.
+Methods of odometry and of scans come from `radarize.pipeline.methods`. Each batch gives a `Result`, which is written to
+a run folder, shown on the live page, or kept in memory.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,30 +24,31 @@ from radarize.slam.config import SlamConfig
 
 
 class OdometryEstimator(Protocol):
-    """Odometry of a stream of frames."""
+    """Interface of odometry on a stream of frames."""
 
     def update(self, batch: Batch) -> Track:
-        """Poses of the next frames, or of those of them that it uses. Scans of the batch are in `Batch.ranges`."""
+        """Return poses of the next frames, or of those of them that it uses. `Batch.ranges` has the scans of the
+        batch."""
         ...
 
 
 class ScanExtractor(Protocol):
-    """Scans of a stream of frames."""
+    """Interface of scans on a stream of frames."""
 
     def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
-        """Ranges of the next frames on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""
+        """Return ranges of the next frames on `radarize.signal.bearings.BEARINGS`, m; inf: no echo."""
         ...
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a batch gave.
+    """Result of a batch.
 
     Attributes:
-        frames: numbers of its frames as the radar sent them, see `radarize.radar.numbering`.
-        track: of these frames: poses, covariances, velocities.
-        ranges: scans on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen.
-        flaws: of these frames; None where nobody looked.
+        frames: frame numbers as the radar sent them, see `radarize.radar.numbering`.
+        track: poses, covariances and velocities of these frames.
+        ranges: scans on `radarize.signal.bearings.BEARINGS`, m; inf: no echo.
+        flaws: disturbed chirps and receivers of these frames; None if not computed.
     """
 
     frames: Int[np.ndarray, "frame"]
@@ -57,18 +58,18 @@ class Result:
 
 
 class Pipeline:
-    """Radar SLAM as a stream: push batches, then read trajectory and map off `slam`. Memory grows with the way that is
-    covered, not with the data.
+    """Radar SLAM on a stream: push batches, then read trajectory and map from `slam`. Memory grows with the length of
+    the path, not with the number of frames.
 
     Args:
-        odometry, extractor: methods.
+        odometry, extractor: methods of odometry and of scans.
         slam: settings of the back end.
-        endless: without trajectory, and memory grows with the ground that is covered; see `Slam`.
+        endless: keep no trajectory, so that memory grows with the mapped area only; see `Slam`.
 
     Attributes:
         slam: the back end.
-        stopwatch: of its stages.
-        seconds: of each stage by name, so far.
+        stopwatch: measures the time of each stage.
+        seconds: time of each stage so far, by name, s.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Pipeline:
         return self.stopwatch.seconds
 
     def push(self, batch: Batch) -> Result:
-        """Follow the sensor over the next frames, and map what it saw."""
+        """Estimate the motion of the sensor over the next frames, and add their scans to the map."""
         with self.stopwatch.running():
             batch.ranges = self.extractor.extract(batch)
             track = self.odometry.update(batch)
@@ -101,11 +102,11 @@ class Pipeline:
             return Result(batch.numbers[used], track, ranges.astype(np.float32), flaws)
 
     def run(self, batches: Iterable[Batch]) -> Iterator[Result]:
-        """Push all of a stream's batches that hold frames, then finish."""
+        """Push all batches of a stream that have frames, then finish."""
         yield from (self.push(batch) for batch in batches if len(batch))
         self.finish()
 
     def finish(self) -> None:
-        """Close the last loops and optimise."""
+        """Search the last loop closures and optimise."""
         with self.stopwatch.running(), stage("slam"):
             self.slam.finish()

@@ -1,4 +1,4 @@
-"""Sparse points, as the radar's own firmware makes them."""
+"""Sparse point clouds, computed as in the radar's own firmware."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -41,21 +41,21 @@ class PointCloud:
 
     @property
     def xyz(self) -> Float[np.ndarray, "point 3"]:
-        """(point, 3) x forward, y left, z up, m."""
+        """Positions (point, 3): x forward, y left, z up, m."""
         return self.points[:, :3]
 
     @property
     def velocity(self) -> Float[np.ndarray, "point"]:
-        """(point,) radial speed, m/s, closing positive."""
+        """Radial speed (point,), m/s, closing positive."""
         return self.points[:, 3]
 
     @property
     def snr(self) -> Float[np.ndarray, "point"]:
-        """(point,) dB."""
+        """Signal-to-noise ratio (point,), dB."""
         return self.points[:, 4]
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A table: frame, x, y, z (m), velocity (m/s), snr, noise (dB)."""
+        """Return a table: frame, x, y, z (m), velocity (m/s), snr, noise (dB)."""
         import pandas
 
         return pandas.DataFrame({"frame": self.frame} | dict(zip(COLUMNS, self.points.T, strict=True)))
@@ -76,7 +76,7 @@ def point_cloud(frames: Samples | Source, *, settings: PointCloudConfig | None =
     """Detect points by the processing chain of TI's demo firmware: CFAR over range and Doppler, then angles.
 
     Args:
-        frames: of a recording, such as ``rec[100]``; a recording for all of its frames.
+        frames: frames of a recording, such as ``rec[100]``; a recording for all of its frames.
         settings: thresholds and windows; by default those of TI's profile for the xWR1843.
 
     Returns:

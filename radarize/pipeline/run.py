@@ -1,4 +1,4 @@
-"""The whole pipeline on a recording."""
+"""Run the whole pipeline on a recording."""
 
 import shutil
 import tempfile
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 
 class Run:
-    """What the pipeline made of a recording; each part is read when it is asked for.
+    """Result of the pipeline on a recording; each part is read on first access.
 
     Args:
         path: folder that `run` or ``radarize run`` wrote.
 
     Attributes:
-        path: the folder; a temporary one goes with the object.
-        folder: its files, for programs that read them.
+        path: the folder; a temporary one is deleted with the object.
+        folder: reader of its files, for programs that need them.
 
     Raises:
-        InputError: it is no such folder, or not a whole one.
+        InputError: not a run folder, or an incomplete one.
 
     Example:
         >>> run = rz.Run("RUN")
@@ -59,13 +59,13 @@ class Run:
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """Of SLAM, a pose for each scan; the first one lies near the origin."""
+        """Trajectory of SLAM, a pose for each scan; the first pose is near the origin."""
         time, pose = self.folder.trajectory
         return Trajectory(time, pose, self.folder.scans.get("trajectory_covariance"), name="SLAM")
 
     @cached_property
     def odometry(self) -> Trajectory | None:
-        """Of odometry alone, with velocities; None where the run had none."""
+        """Trajectory of odometry alone, with velocities; None if the run has none."""
         if (found := self.folder.odometry) is None:
             return None
         time, pose = found
@@ -77,19 +77,19 @@ class Run:
 
     @cached_property
     def truth(self) -> Trajectory | None:
-        """True poses, with the floor plan where it is known; None without truth."""
+        """True poses, with the floor plan if it is known; None without truth."""
         if (found := self.folder.reference) is None:
             return None
         return Trajectory(*found, floor_plan=self.folder.scans.get("truth/floor_plan"), name="truth")
 
     @cached_property
     def map(self) -> OccupancyMap | None:
-        """Occupancy, in the frame of `trajectory`."""
+        """Occupancy map, in the frame of `trajectory`."""
         return self.folder.map
 
     @cached_property
     def scans(self) -> xarray.DataArray:
-        """(time, azimuth) ranges in m, inf where nothing is seen; ``time`` s, ``azimuth`` rad, positive to the left.
+        """Ranges (time, azimuth) in m, inf: no echo; ``time`` s, ``azimuth`` rad, positive to the left.
 
         Raises:
             InputError: the run has no scans.
@@ -105,21 +105,21 @@ class Run:
 
     @property
     def facts(self) -> dict[str, object]:
-        """Recording, settings, versions, timings: what ``run.json`` holds."""
+        """Content of ``run.json``: recording, settings, versions, timings."""
         return self.folder.facts
 
     @property
     def methods(self) -> dict[str, str]:
-        """Methods by what they are for: ``odometry``, ``scans``."""
+        """Names of the methods, with keys ``odometry`` and ``scans``."""
         return self.folder.methods
 
     @property
     def warnings(self) -> list[str]:
-        """What the pipeline noticed, such as unobservable motion."""
+        """Warnings of the pipeline, such as unobservable motion."""
         return self.folder.warnings
 
     def save(self, folder: str | Path) -> Path:
-        """Copy the run to a folder, in place of one that is there: trajectories (TUM), a ROS map, scans (HDF5), ...
+        """Copy the run to a folder, replacing an existing one: trajectories (TUM), ROS map, scans (HDF5), ...
 
         Raises:
             InputError: it cannot be written.
@@ -136,7 +136,7 @@ class Run:
         return Path(folder)
 
     def plot(self, axes: "Axes | None" = None, *, truth: Trajectory | None = None) -> "Axes":
-        """Draw trajectories and map from above, in m; with a `truth`, such as ``rec.truth``, laid upon it.
+        """Draw trajectories and map from above, in m; a `truth`, such as ``rec.truth``, is aligned and drawn with them.
 
         Raises:
             InputError: fewer than three poses of the truth match.
@@ -179,9 +179,9 @@ def run(
         output: folder to write: trajectory.tum (SLAM), odometry.tum, reference.tum (if there are true poses), map.pgm
             and map.yaml (ROS), scans.h5, run.json. By default a temporary one, see `Run.save`.
         odometry, scans: methods by name; by default networks where they fit the radar, else the classical ones.
-        settings: reading of the paper: ``"published"`` is ``odometry="published", scans="published"``.
-        weights: folder of the networks' weights; by default the shipped ones.
-        config: settings of the pipeline, or a YAML file of them (``radarize config`` prints all).
+        settings: variant of the paper's method: ``"published"`` is ``odometry="published", scans="published"``.
+        weights: folder with network weights; by default the shipped ones.
+        config: pipeline settings, or a YAML file of them (``radarize config`` prints all).
         progress: called with (frames done, frames in all).
 
     Returns:

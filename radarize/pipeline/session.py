@@ -1,4 +1,4 @@
-"""From a recording to a folder with trajectory, map and all that they were made of."""
+"""Run the pipeline on a recording and write the run folder."""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -29,12 +29,12 @@ def run_recording(
     """Run the pipeline on a recording and write a run folder.
 
     Args:
-        frames: of a recording: all, some, or every N-th.
-        folder: to write.
-        methods: ``odometry`` and ``scans`` by name.
-        weights: folder of the networks' weights; the shipped ones if None.
-        configuration: of the pipeline.
-        facts: what ``run.json`` says of the methods beside their names.
+        frames: frames of a recording: all, a part, or every N-th.
+        folder: folder to write.
+        methods: names of ``odometry`` and ``scans``.
+        weights: folder with network weights; None: the shipped ones.
+        configuration: settings of the pipeline.
+        facts: further entries of ``methods`` in ``run.json``.
         progress: called with (frames done, frames in all).
 
     Raises:
@@ -70,10 +70,10 @@ def run_recording(
 
 
 def inputs_of(frames: Clip, weights: str | Path | None, configuration: Configuration | None) -> Inputs:
-    """What methods are made from, for frames of a recording.
+    """Return the inputs of methods, for frames of a recording.
 
     Raises:
-        InputError: there are none.
+        InputError: the recording has no frames.
     """
     source = frames.recording
     if not len(frames):
@@ -87,8 +87,7 @@ def batches(
     progress: Callable[[int, int], None] = lambda done, total: None,
     summary: Summary | None = None,
 ) -> Iterator[Batch]:
-    """Frames in batches; `progress` is called with how many have been used and how many there are, each N-th or not;
-    `summary` takes in all of them."""
+    """Yield frames in batches, and call `progress` with (frames done, frames in all); `summary` collects all frames."""
     source, span = frames.recording, frames.span
     size = together(source.config)
     for start in range(span.start, span.stop, size):

@@ -1,8 +1,8 @@
-"""Antenna positions of the evaluation boards and the virtual array that they span.
+"""Antenna positions of the evaluation boards and their virtual array.
 
 Sensor frame: x forward (boresight), y left, z up, origin at the (0, 0) of the board's layout (RX1; RX4 on the AOP).
-The layouts stand in the boards' files (`radarize.radar.boards`). Transmitters that fire at once are one in the middle
-between them.
+The boards' files contain the layouts (`radarize.radar.boards`). Transmitters that fire simultaneously count as one at
+their midpoint.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired, firing_name
 
-#: Antennas of a row that is not short; what velocities claim was fitted to rows of these.
+#: Number of antennas of a full row; the velocity's covariance was fitted to rows of this length.
 ROW = 8
 
 
@@ -29,8 +29,8 @@ def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
 
 
 def layout(config: RadarConfig) -> tuple[Float[np.ndarray, "tx 2"], Float[np.ndarray, "rx 2"]]:
-    """Left and up of the enabled transmitters and receivers, physical order, in half wavelengths at the board's design
-    frequency."""
+    """Positions (left, up) of the enabled transmitters and receivers, physical order, in half wavelengths at the
+    board's design frequency."""
     board = load_board(config.board)
     tx, rx = np.asarray(board.tx, float), np.asarray(board.rx, float)
     return np.array([tx[list(fired(firing))].mean(axis=0) for firing in config.tx]), rx[list(config.rx)]
@@ -54,12 +54,12 @@ def _half(config: RadarConfig) -> float:
 
 
 def _lattice(config: RadarConfig) -> Float[np.ndarray, "antenna 2"]:
-    """Left and up of the virtual antennas, flat (tx, rx), in half wavelengths to three digits."""
+    """Positions (left, up) of the virtual antennas, flat (tx, rx), in half wavelengths to three digits."""
     return np.round(virtual_positions(config).reshape(-1, 3)[:, 1:] / _half(config), 3)
 
 
 def rows(config: RadarConfig) -> dict[float, Int[np.ndarray, "antenna"]]:
-    """Virtual antennas of equal height, as flat (tx, rx) indices by ascending y; where two coincide, the first stays.
+    """Virtual antennas of equal height, as flat (tx, rx) indices by ascending y; of coinciding ones, the first is kept.
 
     Returns a dictionary from height (half wavelengths, ascending) to indices.
     """
@@ -77,15 +77,15 @@ def azimuth_row(config: RadarConfig) -> Int[np.ndarray, "antenna"]:
 
 
 def row_beside(heights: Iterable[float], height: float) -> float | None:
-    """The row that tells elevation together with the one at `height`: the nearest less than a wavelength away, the
-    upper one of two; None without one. Heights in half wavelengths."""
+    """Height of the row used with the one at `height` to estimate elevation: the nearest less than a wavelength away,
+    the upper one of two; None without one. Heights in half wavelengths."""
     others = sorted((h for h in heights if 0 < abs(h - height) < 2), key=lambda h: (abs(h - height), -h))
     return others[0] if others else None
 
 
 def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
-    """Pairs (lower, upper) of virtual antennas at the same y in rows that follow each other, less than a wavelength
-    apart in z; None without such pairs.
+    """Pairs (lower, upper) of virtual antennas at the same y in neighbouring rows, less than a wavelength apart in z;
+    None without such pairs.
 
     Averaging a pair steers to 0 deg elevation and, where it is half a wavelength high, nulls the zenith: the paper's
     elevation-aware beamforming (section 4).
@@ -101,12 +101,13 @@ def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
 
 
 def is_whole(config: RadarConfig) -> bool:
-    """Whether the array tells elevation and has a row of eight antennas, as the IWR1843's with all transmitters."""
+    """Whether the array resolves elevation and has a row of eight antennas, like the IWR1843's with all
+    transmitters."""
     return elevation_pairs(config) is not None and len(azimuth_row(config)) >= ROW
 
 
 def losses(config: RadarConfig) -> list[str]:
-    """What the order in which transmitters fire costs, a sentence each: nothing where each fires once, alone."""
+    """Losses by the firing order of the transmitters, a sentence each; empty if each fires once, alone."""
     found = []
     several = [firing for firing in config.tx_order if len(fired(firing)) > 1]
     if several:

@@ -1,4 +1,4 @@
-"""Frames from the data packets of a DCA1000, whatever becomes of them on their way."""
+"""Assembly of frames from the data packets of a DCA1000, with packet loss, duplication and reordering."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,20 +11,20 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD, Packet, check_layout
 
 _ONES = bytes([1]) * MAX_PAYLOAD
-#: Packets far from the stream that must lie near each other before it is believed to go on there, and how many wait.
+#: Number of agreeing packets away from the stream needed to accept that it continues there, and number that may wait.
 _AGREEING, _WAITING = 4, 64
 
 
 @dataclass
 class PacketCounts:
-    """What became of a capture's packets.
+    """Statistics of a capture's packets.
 
     Attributes:
-        received, duplicates, late, damaged: packets that were used, held nothing new, came (perhaps again) after their
-            frame was given out, or had an impossible header or length.
-        stray: whose byte counts lie far from those of all others, or further than the radar can have come.
-        lost_bytes: of the frames given out, that never came.
-        incomplete_bytes: that had come of a last frame that is not whole.
+        received, duplicates, late, damaged: packets that were used, had no new data, arrived after their frame was
+            completed, or had an impossible header or length.
+        stray: packets with byte counts far from all others, or beyond what the radar can have sent.
+        lost_bytes: bytes of completed frames that never arrived.
+        incomplete_bytes: bytes received of a last frame that is not whole.
     """
 
     received: int = 0
@@ -37,11 +37,11 @@ class PacketCounts:
 
     @property
     def packets(self) -> int:
-        """That came, in all."""
+        """Total number of packets."""
         return self.received + self.duplicates + self.late + self.damaged + self.stray
 
     def warnings(self) -> list[str]:
-        """What the user should know."""
+        """Warnings for the user."""
         found = (
             (self.incomplete_bytes, "bytes of an incomplete last frame are left out"),
             (self.lost_bytes, "bytes were lost, their chirps are marked"),
@@ -60,11 +60,11 @@ class _PartialFrame:
 
     def __init__(self, size: int):
         self.data = bytearray(size)
-        self.arrived = bytearray(size)  # 1 where data came
+        self.arrived = bytearray(size)  # 1 where data arrived
         self.missing = size
 
     def place(self, start: int, part: memoryview) -> int:
-        """Put bytes where they belong; returns how many of them had not come before."""
+        """Store bytes at their position; return the number of new ones."""
         end = start + len(part)
         fresh = len(part) - self.arrived.count(1, start, end)
         self.data[start:end] = part
@@ -74,10 +74,10 @@ class _PartialFrame:
 
 
 class _Doubtful:
-    """Packets far from the stream: of damaged or forged headers, or the first ones after a gap.
+    """Packets far from the stream: with damaged or forged headers, or the first ones after a gap.
 
     Args:
-        near: bytes within which packets agree with each other.
+        near: distance in bytes within which packets agree with each other.
     """
 
     def __init__(self, near: int):
@@ -88,7 +88,7 @@ class _Doubtful:
         return sum(map(len, self._groups))
 
     def add(self, packet: Packet) -> list[Packet]:
-        """Keep a packet; returns those that it makes believed together, none if there are not enough."""
+        """Add a packet; return the packets accepted together with it, none if there are not enough."""
         group = next((g for g in self._groups if abs(packet.offset - g[-1].offset) <= self._near), None)
         if group is None:
             self._groups.append(group := [])
@@ -99,33 +99,33 @@ class _Doubtful:
         return group
 
     def drop(self, all_of_them: bool = False) -> int:
-        """Give up what waits for too long, or all; returns how many packets."""
+        """Discard packets that have waited too long, or all; return their number."""
         before = len(self)
         while self._groups and (all_of_them or len(self) > _WAITING):
             del self._groups[0]
         return before - len(self)
 
     def last(self) -> list[Packet]:
-        """The largest group, when nothing more will come."""
+        """Return the largest group at the end of the stream."""
         return self._groups.pop(int(np.argmax(list(map(len, self._groups))))) if self._groups else []
 
 
 class FrameAssembler:
-    """Puts frames together from packets that come late, twice, out of order, or never.
+    """Assemble frames from packets that arrive late, twice, out of order, or never.
 
-    A payload belongs where its byte count says, so a lost packet never shifts what follows. A frame is given out, in
-    order, when it is whole or when the newest byte is `window` bytes past its end; what is missing then is zero, and
-    the chirps it belongs to are marked.
+    A payload is stored at its byte count, so a lost packet never shifts later data. A frame is completed, in
+    order, when it is whole or when the newest byte is `window` bytes past its end; missing samples are then zero, and
+    their chirps are marked.
 
-    One packet alone moves the stream by no more than `window`: further on, and to its beginning, it goes when several
-    agree, with nothing between them that goes on where it was.
+    A single packet moves the stream by at most `window`. It moves further, or starts, only if several packets agree,
+    with no packet between them that continues at the old position.
 
     Args:
-        window: how far behind the newest byte a late packet is still accepted.
+        window: distance in bytes behind the newest byte up to which a late packet is accepted.
 
     Attributes:
-        begun: byte count at which the stream began; None before.
-        furthest: byte count that nothing can be beyond, whatever agrees; who knows the time may set it.
+        begun: byte count at the start of the stream; None before.
+        furthest: upper limit of byte counts, which the caller may set from the elapsed time.
     """
 
     def __init__(self, config: RadarConfig, window: int = 1 << 20):
@@ -136,13 +136,13 @@ class FrameAssembler:
         self.counts = PacketCounts()
         self.begun: int | None = None
         self.furthest = float("inf")
-        self._first = self._next = 0  # numbers of the frame that was, or would have been, given out first, and next
-        self._newest = 0  # end of the furthest payload so far
+        self._first = self._next = 0  # numbers of the first frame, even if its start was not received, and of the next
+        self._newest = 0  # largest end of a payload
         self._partial: dict[int, _PartialFrame] = {}
         self._doubtful = _Doubtful(window)
 
     def take(self, data: bytes | memoryview) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """As `add`, with a UDP payload; one that is no data packet is counted as damaged."""
+        """Accept a UDP payload like `add`; one that is no data packet is counted as damaged."""
         try:
             packet = Packet.decode(data)
         except InputError:
@@ -151,7 +151,7 @@ class FrameAssembler:
         yield from self.add(packet)
 
     def add(self, packet: Packet) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Take a packet; yields frames that are now settled, as `_settle` describes."""
+        """Accept a packet and yield the frames it completes, see `_settle`."""
         end = packet.offset + len(packet.payload)
         if end > self.furthest:
             self.counts.stray += 1
@@ -162,29 +162,29 @@ class FrameAssembler:
                     self.counts.stray += self._doubtful.drop(all_of_them=True)
             self._place(packet)
             yield from self._settled()
-        elif believed := self._doubtful.add(packet):
-            yield from self._go_on(believed)
+        elif accepted := self._doubtful.add(packet):
+            yield from self._go_on(accepted)
         else:
             self.counts.stray += self._doubtful.drop()
 
     @property
     def waiting(self) -> int:
-        """Packets that are not believed yet."""
+        """Number of packets not accepted yet."""
         return len(self._doubtful)
 
     def _follows(self, start: int, end: int) -> bool:
-        """Whether a payload lies where the stream is. Until a frame was given out, the beginning may have been none."""
+        """Whether a payload is near the stream. Until the first frame is complete, the start may still be revised."""
         if self.begun is None or end > self._newest + self.window:
             return False
         return self._next > self._first or start >= self.begun - self.window
 
     def _go_on(self, packets: list[Packet]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """The stream begins, or goes on after a gap, with packets that agree."""
+        """Start the stream, or continue it after a gap, at packets that agree."""
         lowest = min(packet.offset for packet in packets)
         if self._next == self._first and not (self.begun is not None and lowest > self._newest):
             self.counts.stray += self._forget()
             self.begun = lowest
-            # Listening may begin in the middle of a capture.
+            # A receiver may start in the middle of a capture.
             self._first = self._next = -(-lowest // self._size) if lowest > self.window else 0
             self._newest = lowest
         for packet in packets:
@@ -193,14 +193,14 @@ class FrameAssembler:
         yield from self._settled()
 
     def _forget(self) -> int:
-        """Give up a beginning that was none; returns the packets that were taken for it."""
+        """Revise the start of the stream; return the number of packets discarded."""
         taken = self.counts.received + self.counts.duplicates + self.counts.late
         self.counts.received = self.counts.duplicates = self.counts.late = 0
         self._partial.clear()
         return taken
 
     def finish(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """No packet will come any more: yields the frames left whose last byte, or a later one, has come."""
+        """At the end of the stream, yield the remaining frames whose last byte, or a later one, was received."""
         if self.begun is None:
             if packets := self._doubtful.last():
                 yield from self._go_on(packets)
@@ -238,7 +238,7 @@ class FrameAssembler:
         return number in self._partial and not self._partial[number].missing
 
     def _settle(self) -> tuple[Int16[np.ndarray, "word"], Bool[np.ndarray, "loop tx"]]:
-        """Give out the next frame: its words as captured, for `decode`, and which chirps (physical order) are whole."""
+        """Complete the next frame: its words as captured, for `decode`, and which chirps (physical order) are whole."""
         partial = self._partial.pop(self._next, None) or _PartialFrame(self._size)
         self._next += 1
         self.counts.lost_bytes += partial.missing

@@ -1,4 +1,4 @@
-"""TI SDK configuration files (``.cfg``): the command lines that the demo firmware takes over UART.
+"""TI SDK configuration files (``.cfg``): command lines sent to the demo firmware over UART.
 
 Low-power chips have commands of their own (`radarize.radar.lowpower`).
 """
@@ -19,9 +19,9 @@ from radarize.radar.lowpower import COMMANDS as LOW_POWER
 from radarize.radar.lowpower import parse_low_power
 
 REQUIRED = ("dfeDataOutputMode", "channelCfg", "adcCfg", "adcbufCfg", "profileCfg", "chirpCfg", "frameCfg")
-#: Bytes of a file.
+#: Largest size of a file, bytes.
 _LARGEST = 1 << 20
-#: Chirps of a loop that do not repeat.
+#: Largest number of different chirps in a loop.
 _MOST_CHIRPS = 64
 
 
@@ -47,10 +47,10 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
 
     Args:
         text: content of a ``.cfg`` file.
-        name: what errors call it, usually the path.
+        name: name in error messages, usually the path.
 
     Raises:
-        InputError: with file, line, command and field: a missing or malformed line, or a setting that this project
+        InputError: names file, line, command and field: a missing or malformed line, or a setting that this project
             does not cover (several profiles, several subframes, chirps that vary).
 
     Example:
@@ -64,7 +64,7 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
     commands: dict[str, list[Command]] = {}
     for command in commands_of(text, name):
         commands.setdefault(command.name, []).append(command)
-    last = {key: lines[-1] for key, lines in commands.items()}  # the firmware keeps the latest
+    last = {key: lines[-1] for key, lines in commands.items()}  # the last one is effective
     if not LOW_POWER.isdisjoint(last):
         return parse_low_power(last, _board(text, name), name)
     if advanced := "advFrameCfg" in last:
@@ -129,12 +129,12 @@ def parse_cfg(text: str, name: str = "configuration") -> RadarConfig:
 
 
 def remarks(text: str, config: RadarConfig) -> list[str]:
-    """What a reader of a configuration should know, a sentence each: the board that was assumed because nothing names
-    one, and what the order of its transmitters costs (`radarize.radar.array.losses`).
+    """Remarks on a configuration, a sentence each: the board that was assumed if none is named, and losses by the
+    firing order of its transmitters (`radarize.radar.array.losses`).
 
     Args:
-        text: of a ``.cfg`` file; nothing is said of the board of another one.
-        config: that was read from it.
+        text: content of a ``.cfg`` file; for other formats there are no remarks on the board.
+        config: configuration read from it.
     """
     found = losses(config)
     if _is_cfg(text) and _board(text, "configuration") is None:
@@ -143,10 +143,10 @@ def remarks(text: str, config: RadarConfig) -> list[str]:
 
 
 def assumed_board(config: RadarConfig) -> str:
-    """Where nothing names the board: which is assumed, and how to say otherwise."""
+    """Remark that no board is named: which one is assumed, and how to set it."""
     return (
-        f"nothing names the board, whose antennas decide all directions: {config.board} is assumed; --board, or a line "
-        f"'% Board:{config.board}' in the .cfg, says otherwise"
+        f"no board is named, but its antennas determine all directions: {config.board} is assumed; --board, or a "
+        f"line '% Board:{config.board}' in the .cfg, sets another one"
     )
 
 
@@ -158,10 +158,10 @@ class Frame(NamedTuple):
     """Chirps of a frame.
 
     Attributes:
-        command: that says so.
-        first, end: numbers of a loop's chirps.
-        loops: of them.
-        period: s.
+        command: command that defines the frame.
+        first, end: indices of a loop's chirps.
+        loops: number of loops.
+        period: frame period, s.
     """
 
     command: Command
@@ -183,7 +183,7 @@ def _frame(command: Command) -> Frame:
 
 
 def _subframe(subframes: list[Command]) -> Frame:
-    """Of advanced frames: a single subframe of one burst is a plain frame."""
+    """Frame of an advanced configuration: a single subframe of one burst equals a plain frame."""
     command = subframes[-1]
     for field in ("numOfBurst", "numOfBurstLoops"):
         command.require(field, (1,), "one burst a subframe: pauses between bursts leave gaps in the Doppler transform")
@@ -195,7 +195,7 @@ def _subframe(subframes: list[Command]) -> Frame:
 def _firing(
     frame: Frame, chirps: list[Command], profiles: list[Command], channel: Command
 ) -> tuple[tuple[Firing, ...], Command]:
-    """What fires in one pass through the frame's chirps, by 0-based physical numbers, and the profile they use."""
+    """Transmitters that fire in one pass through the frame's chirps, by 0-based physical numbers, and their profile."""
     enabled = channel.integer("txChannelEn", 1, 255)
     order: list[Firing] = []
     used: list[int] = []
@@ -209,7 +209,7 @@ def _firing(
         chirp = matching[-1]
         for field in ("startFreqVar", "freqSlopeVar", "idleTimeVar", "adcStartTimeVar"):
             if chirp.decimal(field) != 0:
-                raise chirp.error(field, "0 (all chirps alike)")
+                raise chirp.error(field, "0 (the same for all chirps)")
         mask = chirp.integer("txEnable", 0, 255)
         if not mask:
             raise chirp.error("txEnable", "a transmitter at least")
@@ -228,18 +228,18 @@ def _firing(
 
 
 def numbers(mask: int) -> tuple[int, ...]:
-    """0-based numbers of a mask's antennas."""
+    """0-based antenna numbers of a bit mask."""
     return tuple(k for k in range(mask.bit_length()) if mask >> k & 1)
 
 
 def firing_of(mask: int) -> Firing:
-    """What fires by a mask of transmitters."""
+    """Transmitters of a bit mask, as a `Firing`."""
     several = numbers(mask)
     return several[0] if len(several) == 1 else several
 
 
 def distinct_order(order: tuple[Firing, ...], where: str) -> tuple[tuple[Firing, ...], int]:
-    """Shortest firing order that, repeated, gives the chirps of a loop; and how often it repeats.
+    """Shortest firing order whose repetition gives the chirps of a loop, and the number of repetitions.
 
     Raises:
         InputError: it is too long.
@@ -253,8 +253,8 @@ def distinct_order(order: tuple[Firing, ...], where: str) -> tuple[tuple[Firing,
 
 
 def _modulated(command: Command, frame: Frame, order: tuple[Firing, ...]) -> tuple[tuple[Firing, ...], tuple[int, int]]:
-    """Firing order of a loop with binary phase modulation, taken apart: the first of the two transmitters in the place
-    of the chirp with both in phase, the second in that of the chirp with the second one reversed; and these places."""
+    """Firing order of a loop with binary phase modulation, demodulated: the first of the two transmitters in the place
+    of the chirp with both in phase, the second in that of the chirp with the second one inverted; and these places."""
     first, second = (command.integer(field, 0, 511) - frame.first for field in ("chirp0Idx", "chirp1Idx"))
     pairs = {order[slot] if 0 <= slot < len(order) else () for slot in (first, second)}
     both = fired(pairs.pop()) if len(pairs) == 1 and first != second else ()
@@ -266,8 +266,9 @@ def _modulated(command: Command, frame: Frame, order: tuple[Firing, ...]) -> tup
 
 
 def _board(text: str, name: str) -> Any:
-    """The board that a comment names (``% Board:`` of ours, ``% Platform:`` of TI's visualizer), or a command; None if
-    nothing does. Ours is a name, the path of a board's file, or what that holds, as `write_cfg` has it."""
+    """Board named by a comment (``% Board:`` of this project, ``% Platform:`` of TI's visualizer) or a command; None if
+    there is none. This project's comment has a name, the path of a board's file, or its content, as `write_cfg` writes
+    it."""
     if found := re.search(r"^%\s*Board:[ \t]*(\S.*?)\s*$", text, re.MULTILINE):
         if found[1].startswith("{"):
             return parse_json(found[1], f"{name}: Board")
@@ -278,7 +279,7 @@ def _board(text: str, name: str) -> Any:
 
 
 def _loop_idle_time(text: str) -> float:
-    """Of a comment of ours, s: the SDK's chips have none."""
+    """Idle time after a loop from this project's comment, s: the SDK's chips have none."""
     found = re.search(r"^%\s*LoopIdleTime:\s*(\d+\.?\d*)\s*$", text, re.MULTILINE)
     return float(Decimal(found[1]).scaleb(-6)) if found else 0.0
 
@@ -292,7 +293,7 @@ def _backoff(profile: Command, tx_order: tuple[Firing, ...]) -> float:
 
 
 def _calibration(last: dict[str, Command]) -> dict[str, Any]:
-    """What was measured; nothing where the file holds what TI's hold before anybody has."""
+    """Measured calibration; empty if the file has TI's default values."""
     factors: list[complex] = []
     bias = 0.0
     if command := last.get("compRangeBiasAndRxChanPhase"):
@@ -313,10 +314,10 @@ def _calibration(last: dict[str, Command]) -> dict[str, Any]:
 
 # --- writing ----------------------------------------------------------------------------------------------------------
 def write_cfg(config: RadarConfig) -> str:
-    """The configuration as commands for the SDK demo firmware; ``parse_cfg`` of it is equal to `config`.
+    """Write a configuration as commands for the SDK demo firmware; ``parse_cfg`` of it returns an equal configuration.
 
     Raises:
-        InputError: a value has no code in the format (a gain that is not a whole number of dB, say).
+        InputError: a value has no code in the format (such as a gain that is not a whole number of dB).
     """
     gain = _whole("rx_gain_db", config.rx_gain_db, 63)
     backoff = _whole("tx_backoff_db", config.tx_backoff_db, 255)
@@ -379,7 +380,7 @@ def write_cfg(config: RadarConfig) -> str:
 
 
 def cfg_headers(config: RadarConfig) -> list[str]:
-    """Comment lines of TI's visualizer that other programs read: radarize_ae and xwr_raw_ros refuse a file without.
+    """Comment lines of TI's visualizer without which radarize_ae and xwr_raw_ros refuse a file.
 
     Example:
         >>> cfg_headers(PRESETS["radarize"])

@@ -1,4 +1,4 @@
-"""Lines of TI's configuration files (``.cfg``): commands, whose values are read by name.
+"""Commands of TI's configuration files (``.cfg``), with values read by name.
 
 Command syntax: mmWave SDK 3.x user's guide, section "Configuration (.cfg) file format"; MMWAVE-L-SDK for low-power
 chips. Commands that concern only the on-chip processing (CFAR, angle of arrival, tracking, ...) are ignored.
@@ -12,7 +12,7 @@ from decimal import Decimal, InvalidOperation
 
 from radarize.io.errors import InputError
 
-#: Fields of the commands read here, in order.
+#: Fields of the commands that are read, in order.
 FIELDS: dict[str, tuple[str, ...]] = {
     "dfeDataOutputMode": ("mode",),
     "channelCfg": ("rxChannelEn", "txChannelEn", "cascading"),
@@ -46,7 +46,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "factoryCalibCfg": ("saveEnable", "restoreEnable", "rxGain", "backoff0", "flashOffset"),
     "antGeometryBoard": ("board",),
 }
-#: Other forms of a command, which the number of values tells apart: of low-power chips, and of the AWR294x.
+#: Other forms of a command, distinguished by the number of values: of low-power chips, and of the AWR294x.
 _BURSTS = "numOfChirpsInBurst numOfChirpsAccum burstPeriodicity numOfBurstsInFrame framePeriodicity numOfFrames"
 _AWR294X = "startIdx endIdx numLoops numFrames numAdcSamples framePeriodicity triggerSelect frameTriggerDelay"
 OTHER_FORMS = {"frameCfg": (tuple(_BURSTS.split()), tuple(_AWR294X.split()))}
@@ -55,7 +55,7 @@ REFUSED = {"contModeCfg": "continuous mode"}
 
 @dataclass(frozen=True)
 class Command:
-    """One line of a configuration: values are read by field name, errors say where."""
+    """One line of a configuration, with values by field name and line numbers in errors."""
 
     file: str
     line: int
@@ -91,10 +91,10 @@ class Command:
 
 
 def commands_of(text: str, name: str) -> Iterator[Command]:
-    """Commands of a configuration; `name` is what errors call it.
+    """Parse the commands of a configuration; `name` is its name in error messages.
 
     Raises:
-        InputError: a line that is no command, of another number of values, or misspelt.
+        InputError: a line that is no command, has a wrong number of values, or is misspelt.
     """
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split("%")[0].split()
@@ -120,7 +120,7 @@ def commands_of(text: str, name: str) -> Iterator[Command]:
 
 
 def _form(word: str, count: int) -> tuple[str, ...] | None:
-    """Fields of a command of so many values."""
+    """Fields of a command with a number of values."""
     if word == "compRangeBiasAndRxChanPhase" and count > 1 and count % 2:  # a pair for each of the board's channels
         return "rangeBias", *(f"{part}{i}" for i in range(count // 2) for part in ("re", "im"))
     if word == "antPhaseRot" and count:

@@ -1,4 +1,4 @@
-"""The radar's configuration: what is transmitted, when, on which antennas, and how it is sampled."""
+"""Radar configuration: transmitted chirps, timing, antennas, and sampling."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,10 +18,10 @@ HIGH_PASS_1 = (175e3, 235e3, 350e3, 700e3)
 HIGH_PASS_2 = (350e3, 700e3, 1.4e6, 2.8e6)
 #: Chirps of a loop.
 _MOST_CHIRPS = 512
-#: Bytes of a frame: what the largest of the limits below would make together is no radar's.
+#: Largest size of a frame, bytes: the largest values of all limits below together are not realistic.
 _LARGEST = 64 << 20
 Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
-#: What fires in a chirp: a transmitter's number, or the numbers of several that fire at once.
+#: Transmitters of a chirp: a number, or the numbers of several that fire simultaneously.
 Firing = int | tuple[int, ...]
 
 
@@ -31,17 +31,17 @@ def fired(firing: Firing) -> tuple[int, ...]:
 
 
 def firing_name(firing: Firing) -> str:
-    """Transmitters of a chirp as on the board: ``TX1``, ``TX1 and TX3``."""
+    """Transmitters of a chirp with their names on the board: ``TX1``, ``TX1 and TX3``."""
     return " and ".join(f"TX{transmitter + 1}" for transmitter in fired(firing))
 
 
 def antennas(count: int) -> str:
-    """Numbers of so many antennas, as errors name them."""
+    """Range of `count` antenna numbers, for error messages."""
     return ", ".join(map(str, range(count)))
 
 
 def _receivers(fields: dict[str, Any]) -> tuple[int, ...]:
-    """All that the board has."""
+    """All receivers of the board."""
     return tuple(range(len(load_board(fields["board"]).rx))) if "board" in fields else ()
 
 
@@ -63,7 +63,7 @@ class RadarConfig(Described):
         loops: repetitions of the transmitter sequence per frame.
         frame_period: time from the start of a frame to the start of the next, s.
         tx_order: transmitters in firing order, 0-based physical numbers (TX1 is 0). One that fires several times in a
-            loop is listed as often, and has a place of its own on the tx axis each time; several that fire at once are
+            loop is listed as often, with its own index on the tx axis each time; several that fire simultaneously are
             listed as a tuple, and count as one transmitter midway between them.
         rx: enabled receivers, 0-based physical numbers, ascending; all of the board if not given.
         loop_idle_time: pause after a loop's last chirp, s (low-power chips: the rest of the burst period).
@@ -85,7 +85,7 @@ class RadarConfig(Described):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     board: str | Board = "iwr1843boost"
-    # Limits are those of any radar, so that whatever is computed from a file stays finite; `limits` has the chips'.
+    # Limits are those of any radar, so that all derived values are finite; `limits` has the chips'.
     start_frequency: float = Field(ge=1e9, le=1e12)
     slope: float = Field(ge=1e9, le=1e17)
     idle_time: float = Field(ge=1e-9, le=10)
@@ -103,7 +103,7 @@ class RadarConfig(Described):
     iq_order: Literal["iiqq", "qqii", "real"] = "qqii"
     range_bias: float = Field(0.0, ge=-1000, le=1000)
     channel_calibration: tuple[tuple[Factor, Factor], ...] | None = None
-    # Of captures by some radars only: other recordings do not mention them.
+    # Only some radars' captures have these fields: other recordings do not store them.
     loop_idle_time: float = Field(0.0, ge=0, le=10, exclude_if=lambda value: value == 0)
     bpm: tuple[int, int] | None = Field(None, exclude_if=lambda value: value is None)
 
@@ -124,7 +124,7 @@ class RadarConfig(Described):
         try:
             return {**fields, "range_bias": load_board(fields["board"]).range_bias} if "board" in fields else fields
         except (InputError, TypeError):
-            return fields  # the field's own validator says what is wrong
+            return fields  # the field's own validator reports the error
 
     @field_validator("channel_calibration")
     @classmethod
@@ -174,7 +174,7 @@ class RadarConfig(Described):
 
     @classmethod
     def build(cls, source: str, **fields: Any) -> "RadarConfig":
-        """A configuration from its fields; `source` is what errors name as their origin.
+        """Build a configuration from its fields; `source` names their origin in error messages.
 
         Raises:
             InputError: a field is missing, unknown or out of range, or the fields contradict each other.
@@ -182,7 +182,7 @@ class RadarConfig(Described):
         try:
             return cls(**fields)
         except ValidationError as error:
-            first = min(error.errors(), key=lambda e: e["type"] == "missing")  # a wrong value says more
+            first = min(error.errors(), key=lambda e: e["type"] == "missing")  # a wrong value is more informative
             field = ".".join(str(part) for part in first["loc"])
             message = first["msg"].removeprefix("Value error, ")
             if first["type"] == "missing":
@@ -192,13 +192,13 @@ class RadarConfig(Described):
             raise InputError(f"{source}: {message}") from error
 
     def changed(self, source: str, **fields: Any) -> "RadarConfig":
-        """The radar with some fields changed; `source` is what errors name as their origin.
+        """Change some fields of the configuration; `source` names their origin in error messages.
 
-        A calibration was measured on one board: on another, the other's applies unless one is given, and so does the
-        range bias of a board that was measured.
+        A calibration applies to one board: a changed board brings its own unless one is given, and likewise its
+        range bias.
 
         Raises:
-            InputError: as `build`.
+            InputError: see `build`.
         """
         found = RadarConfig.build(source, **{**self.model_dump(), **fields})
         board, before = load_board(found.board), load_board(self.board)
@@ -222,13 +222,13 @@ class RadarConfig(Described):
 
     @property
     def turn(self) -> tuple[int, ...]:
-        """Place on the tx axis of what fires in each slot: the inverse of `slot`."""
+        """Index on the tx axis of the transmitter that fires in each slot: the inverse of `slot`."""
         return tuple(sorted(range(len(self.slot)), key=self.slot.__getitem__))
 
     @property
     def channels(self) -> tuple[np.ndarray, ...]:
-        """Index of the enabled channels in an array of all the board's (tx, rx). Transmitters that fire at once have
-        the first one's: a factor that all receivers share changes no direction."""
+        """Index of the enabled channels in an array of all the board's (tx, rx). Transmitters that fire simultaneously
+        use the first one's: a factor common to all receivers changes no direction."""
         return np.ix_([fired(firing)[0] for firing in self.tx], self.rx)
 
     @property
@@ -300,18 +300,18 @@ class RadarConfig(Described):
 
     @property
     def chirp_times(self) -> Float[np.ndarray, "loop tx"]:
-        """Middle of each chirp's ADC window after the frame's stamp, s, transmitters in physical order."""
+        """Centre of each chirp's ADC window after the frame's time stamp, s, transmitters in physical order."""
         loops, slots = np.arange(self.loops)[:, None], np.asarray(self.slot)
         chirps = (loops * len(slots) + slots) * self.chirp_time + loops * self.loop_idle_time
         return chirps + self.idle_time + self.adc_center_time
 
     @property
     def burst_center(self) -> float:
-        """Mean of `chirp_times`, s: the instant that a single-frame product belongs to."""
+        """Mean of `chirp_times`, s: the time to which single-frame products refer."""
         return float(self.chirp_times.mean())
 
     def every(self, count: int) -> "RadarConfig":
-        """The radar of which only every so many-th frame is used.
+        """Configuration of a radar of which only every N-th frame is used.
 
         Raises:
             InputError: `count` is not positive.
@@ -346,7 +346,7 @@ class RadarConfig(Described):
 
     @property
     def channel_factors(self) -> Complex[np.ndarray, "tx rx"]:
-        """The same of all the board's (tx, rx): measured, or the board's."""
+        """The same for all (tx, rx) of the board: measured, or the board's."""
         board = load_board(self.board)
         pairs = self.channel_calibration or board.factors
         return np.array([complex(*pair) for pair in pairs]).reshape(len(board.tx), len(board.rx))

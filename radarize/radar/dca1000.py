@@ -1,9 +1,9 @@
-"""The DCA1000 capture board: order of the samples that it passes on, and its UDP data packets.
+"""DCA1000 capture board: sample order of its data stream, and its UDP data packets.
 
 Two-lane LVDS, complex samples (TI SWRA581, SPRUIJ4): per chirp all samples of the first receiver, then the second, ...;
 words of 16 bits in groups of four, two complex samples: ``I0 I1 Q0 Q1`` (mmWave Studio) or ``Q0 Q1 I0 I1`` (SDK demo).
-Chips without complex samples send a word for each real one. Real samples are made complex, and transmitters that were
-sent in binary phase modulation are taken apart: what is decoded is the same for all.
+Chips without complex samples send one word per real one. Real samples are converted to complex ones, and binary phase
+modulation is demodulated: decoded samples have the same form for all.
 """
 
 import struct
@@ -22,7 +22,7 @@ HEADER = struct.Struct("<IIH")  # sequence from 1; bytes sent before this packet
 
 # --- samples ----------------------------------------------------------------------------------------------------------
 def check_layout(config: RadarConfig) -> None:
-    """Refuse a sample count that does not fill the groups of two complex samples.
+    """Check that the samples fill groups of two complex samples.
 
     Raises:
         InputError: `samples` is odd.
@@ -63,7 +63,7 @@ def decode(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> Int16[np.ndar
 
 
 def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig) -> Int16[np.ndarray, "word"]:
-    """The words that a DCA1000 would have captured: the inverse of `decode` (to a count, of real samples and of binary
+    """Words that a DCA1000 would have captured: the inverse of `decode` (to one count for real samples and for binary
     phase modulation).
 
     Raises:
@@ -85,14 +85,15 @@ def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: Radar
 
 
 def _analytic(real: Int16[np.ndarray, "... sample"]) -> Int16[np.ndarray, "... half 2"]:
-    """Complex samples of the same beats: the upper half of their spectrum mirrors the lower one, and is dropped."""
+    """Complex samples of the same beat signal: the upper half of the spectrum, which mirrors the lower one, is
+    dropped."""
     spectrum = np.fft.rfft(real.astype(np.float32), axis=-1)[..., :-1]
     spectrum[..., 0] /= 2
     return _counts(np.fft.ifft(spectrum, axis=-1))
 
 
 def _real(iq: Int16[np.ndarray, "... half 2"]) -> Int16[np.ndarray, "... sample"]:
-    """Real samples of the same beats: the inverse of `_analytic`."""
+    """Real samples of the same beat signal: the inverse of `_analytic`."""
     spectrum = np.fft.fft(iq[..., 0] + 1j * iq[..., 1], axis=-1)
     spectrum[..., 0] *= 2
     return _rounded(np.fft.irfft(spectrum, 2 * iq.shape[-2], axis=-1))
@@ -101,13 +102,13 @@ def _real(iq: Int16[np.ndarray, "... half 2"]) -> Int16[np.ndarray, "... sample"
 def _demodulated(
     frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig, inverse: bool = False
 ) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
-    """Frames with the two transmitters of binary phase modulation taken apart, each as if it had fired alone in its
-    chirp; or put together again.
+    """Demodulate the two transmitters of binary phase modulation, each as if it had fired alone in its chirp; or
+    modulate them again.
 
     One chirp has the sum of both transmitters' echoes, the other one their difference, a little later. Before they are
-    added, each is moved to the other's instant by a turn of its Doppler spectrum, as TI's demos do: right for speeds
-    within `config.max_velocity`. Where an echo does not end a burst with the phase at which it began it, the first and
-    last loops keep a rest of the other transmitter, 25 dB or more below it once the loops are windowed.
+    added, each is shifted to the other's time by a phase ramp over its Doppler spectrum, as in TI's demos: exact for
+    speeds within `config.max_velocity`. If the phase of an echo differs between the start and the end of a burst, the
+    first and last loops contain a residual of the other transmitter, 25 dB or more below it after windowing over loops.
     """
     assert config.bpm is not None
     places = [config.turn[slot] for slot in config.bpm]
@@ -116,7 +117,7 @@ def _demodulated(
     cycles = np.fft.fftfreq(config.loops)[:, None, None] * later
 
     def moved(chirps: np.ndarray, sign: int) -> np.ndarray:
-        """To later (1) or earlier (-1) by the time between the two chirps."""
+        """Shift to a later (1) or earlier (-1) time by the interval between the two chirps."""
         return np.fft.ifft(np.fft.fft(chirps, axis=1) * np.exp(sign * 2j * np.pi * cycles), axis=1)
 
     scale = 1.0 if inverse else 0.5
@@ -137,16 +138,16 @@ def _rounded(values: Float[np.ndarray, "..."]) -> Int16[np.ndarray, "..."]:
 
 
 def range_balance(frames: Int16[np.ndarray, "frame loop tx rx sample 2"]) -> float:
-    """Energy of the beat spectrum's lower half against the upper one, dB: negative where I and Q are swapped.
+    """Energy of the beat spectrum's lower half relative to the upper one, dB: negative if I and Q are swapped.
 
     Echoes are near, with leakage nearest of all, so the lower half holds more energy (+14 to +36 dB on real captures);
-    swapping I and Q mirrors range. Small values mean undecided; 0 is silence.
+    swapping I and Q mirrors range. Small values are not conclusive; 0 means no signal.
     """
     samples = frames.shape[-2]
     signal = np.ascontiguousarray(frames, np.float32).view(np.complex64).reshape(-1, samples)
     signal = signal - signal.mean(axis=1, keepdims=True)
     power = (np.abs(np.fft.fft(signal * np.hanning(samples), axis=1)) ** 2).sum(axis=0)
-    half, skip = samples // 2, 2  # the window smears the offset into two bins
+    half, skip = samples // 2, 2  # the window spreads the offset over two bins
     near, far = power[skip:half].sum(), power[half + 1 : samples - skip + 1].sum()
     return float(10 * np.log10(near / far)) if near > 0 and far > 0 else 0.0
 
@@ -157,7 +158,7 @@ class Packet:
     """A data packet.
 
     Attributes:
-        sequence: from 1.
+        sequence: number, from 1.
         offset: bytes sent before this packet.
         payload: at most `MAX_PAYLOAD` bytes.
     """

@@ -1,4 +1,4 @@
-"""The DCA1000's commands: requests and replies over UDP, and the status that it sends unasked.
+"""Commands of the DCA1000: requests and replies over UDP, and unsolicited status messages.
 
 TI SPRUIJ4A, section 5, checked on real captures; all little-endian. Requests go to the board's port 4096, replies and
 status to port 4096 of the computer, from any port of the board.
@@ -21,8 +21,8 @@ _TICK = 8e-9  # s, unit of the packet delay
 _PACKET_HEAD = HEADER.size + 4  # counted in the packet size: the data header and 4 bytes more
 #: Shortest and longest delay between packets, s.
 DELAYS = (5e-6, 500e-6)
-#: Bytes, sizes of packets that a board takes; and s, the shortest delay that it does: xwr_raw_ros writes 25 where 25 us
-#: are 3125 ticks, and boards then send as fast as they can.
+#: Bytes, sizes of packets that a board accepts; and s, its shortest accepted delay: xwr_raw_ros writes 25 where 25 us
+#: are 3125 ticks, and boards then send at full speed.
 SIZES, _MICROSECONDS_MEANT = (48, 1472), 25 * _TICK
 #: Body of CONFIGURE: raw mode, two lanes, capture, over Ethernet, 16 bit, timer.
 RAW_TWO_LANES = bytes([1, 2, 1, 2, 3, 30])
@@ -31,7 +31,7 @@ VERSION_2_8 = 2 | 8 << 7
 
 
 class Opcode(IntEnum):
-    """Codes of requests, which replies repeat."""
+    """Codes of requests, repeated in replies."""
 
     RESET_FPGA = 1
     RESET_RADAR = 2
@@ -50,7 +50,7 @@ class Opcode(IntEnum):
 
 
 class Status(IntFlag):
-    """What a STATUS that nobody asked for reports."""
+    """Bits of an unsolicited STATUS."""
 
     NO_LVDS = 1 << 0
     NO_HEADER = 1 << 1
@@ -88,7 +88,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Reply:
-    """The board's answer to a request (status 0: done, 1: failed), or a STATUS that nobody asked for."""
+    """Reply of the board to a request (status 0: success, 1: failure), or an unsolicited STATUS."""
 
     command: int
     status: int = 0

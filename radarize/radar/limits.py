@@ -1,7 +1,7 @@
-"""Checks a configuration against what its radar chip can do, before it is simulated or sent to a sensor.
+"""Check of a configuration against the limits of its radar chip, before simulation or use.
 
-The chips' limits are `radarize.radar.boards.chips.CHIPS`; frame limits are those of the mmWaveLink ICD. Finished
-recordings are not checked: they exist.
+The chips' limits are `radarize.radar.boards.chips.CHIPS`; frame limits are those of the mmWaveLink ICD. Existing
+recordings are not checked.
 """
 
 from collections.abc import Iterator
@@ -22,13 +22,13 @@ _SWEEP_TOLERANCE = 1e6
 
 
 def check_limits(config: RadarConfig, demo: bool = False) -> None:
-    """Refuse what the chip cannot do.
+    """Raise InputError for a configuration beyond the chip's limits.
 
     Args:
-        demo: under the SDK demo, which keeps a frame in memory; mmWave Studio streams larger ones.
+        demo: for the SDK demo, which keeps a frame in memory; mmWave Studio streams larger ones.
 
     Raises:
-        InputError: naming the first field outside its limit, its value and the limit.
+        InputError: names the first field outside its limit, its value and the limit.
     """
     for message in _violations(config, demo):
         raise InputError(f"radar configuration: {message}")

@@ -1,7 +1,7 @@
 """Configurations of TI's low-power chips (xWRL6432, xWRL6844): the commands of the MMWAVE-L-SDK's demos.
 
-A frame is bursts of chirps; the transmitters take turns from chirp to chirp (TDM), or two send in binary phase
-modulation. Samples are real, and come half as fast as complex ones of the same range would.
+A frame is bursts of chirps; the transmitters alternate from chirp to chirp (TDM), or two use binary phase
+modulation. Samples are real, at half the rate of complex ones of the same range.
 """
 
 from collections.abc import Mapping
@@ -12,19 +12,19 @@ from radarize.radar.boards import load_board
 from radarize.radar.commands import Command
 from radarize.radar.config import Firing, RadarConfig
 
-#: Commands by which such a configuration is known.
+#: Commands that identify such a configuration.
 COMMANDS = {"chirpComnCfg", "chirpTimingCfg"}
 _REQUIRED = ("channelCfg", "chirpComnCfg", "chirpTimingCfg", "frameCfg")
-#: High-pass corners (Hz) that `chirpRxHpfSel` selects: 175, 350, 700 and 1400 kHz of one filter of second order, as two
-#: stages of first order that the SDK's other codes have.
+#: High-pass corners (Hz) of `chirpRxHpfSel`: 175, 350, 700 and 1400 kHz of one second-order filter, as two
+#: first-order stages like those of the SDK's other codes.
 _HIGH_PASS = ((175e3, 350e3), (350e3, 350e3), (700e3, 700e3), (700e3, 1.4e6))
-#: s; a burst's period is given in whole microseconds.
+#: s; resolution of a burst's period.
 _ROUNDED = 0.5e-6
 
 
 class _Masks(NamedTuple):
-    """How a chip's commands count: rate of real samples at a divider of 1, Hz; bits of the receivers, and of each
-    transmitter (all of them set where it is on)."""
+    """Units of a chip's commands: rate of real samples at a divider of 1, Hz; bits of the receivers, and of each
+    transmitter (all of them set if it is enabled)."""
 
     clock: float
     rx: tuple[int, ...]
@@ -39,15 +39,15 @@ _CHIPS = {
 
 
 def parse_low_power(last: Mapping[str, Command], board: Any, name: str) -> RadarConfig:
-    """The radar of a low-power configuration.
+    """Read a low-power configuration.
 
     Args:
         last: its commands.
-        board: that it names; None: nothing does, and the receivers' mask tells the chip.
-        name: what errors call it.
+        board: board that it names; None: none, and the receivers' mask determines the chip.
+        name: name in error messages.
 
     Raises:
-        InputError: a command is missing, or asks for what is not covered.
+        InputError: a command is missing, or uses an unsupported feature.
     """
     if missing := [command for command in _REQUIRED if command not in last]:
         raise InputError(f"{name}: has no {missing[0]} line, expected the commands {', '.join(_REQUIRED)}")
@@ -126,7 +126,7 @@ def _loops(frame: Command, slots: int, chirp_time: float) -> tuple[int, float]:
 
 
 def _measured(command: Command | None) -> dict[str, Any]:
-    """Range bias and factors of the channels."""
+    """Measured range bias and channel factors."""
     if command is None:
         return {}
     pairs = range(len(command.fields) // 2)

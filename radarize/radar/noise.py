@@ -1,4 +1,4 @@
-"""Noise of the receivers, told from a recording's own samples."""
+"""Estimate of receiver noise from the samples of a recording."""
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -7,9 +7,9 @@ from radarize.radar.windows import periodic
 
 
 def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Float[np.ndarray, "sample"]:
-    """Noise power per sample that each range bin speaks of, counts^2: of white noise, its power in every bin.
+    """Estimate the noise power per sample from each range bin, counts^2; for white noise, the same in every bin.
 
-    The median over fast Doppler bins: a few movers do not lift it, and of exponential noise it is ln 2 of the mean.
+    The median over fast Doppler bins is robust to a few movers; for exponential noise power it is ln 2 of the mean.
     """
     loops, n = signal.shape[1], signal.shape[-1]
     slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
@@ -20,6 +20,6 @@ def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Flo
 
 
 def noise_floor(profile: Float[np.ndarray, "sample"]) -> float:
-    """Noise power of a sample, counts^2: the profile's level where neither leakage nor the band's edge bend it."""
+    """Noise power of a sample, counts^2: the profile's level away from leakage and band edge."""
     n = len(profile)
     return float(np.median(profile[n // 10 : 8 * n // 10]))

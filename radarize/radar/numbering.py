@@ -1,18 +1,18 @@
-"""Frame numbers from stamps: lost frames leave a gap."""
+"""Frame numbers from time stamps, in which lost frames leave a gap."""
 
 import numpy as np
 from jaxtyping import Float, Int
 
 
 class Numbering:
-    """Numbers a stream of frames. The step from a stamp to the next is rounded to whole frame periods, one at least;
-    only steps count, so a clock that runs some percent fast or slow is no gap, however long the stream.
+    """Frame numbers of a stream. The step between time stamps is rounded to whole frame periods, one at least; only
+    steps count, so a clock error of some percent is not taken for a gap, however long the stream.
 
     Args:
         period: between frames, s.
 
     Attributes:
-        missing: frames so far that never came, between others.
+        missing: number of lost frames so far.
     """
 
     def __init__(self, period: float):
@@ -20,7 +20,7 @@ class Numbering:
         self._last: tuple[int, float] | None = None  # number and stamp
 
     def of(self, stamps: Float[np.ndarray, "frame"]) -> Int[np.ndarray, "frame"]:
-        """Numbers of the next frames; the first one of all is 0.
+        """Numbers of the next frames; the first frame of the stream is 0.
 
         Args:
             stamps: ascending, s.

@@ -1,4 +1,4 @@
-"""Radar configurations by name: of a preset, or of a file."""
+"""Radar configurations by name: presets, or files."""
 
 from pathlib import Path
 
@@ -32,12 +32,12 @@ PRESETS: dict[str, RadarConfig] = {
 
 
 def load_config(source: str | Path | RadarConfig) -> tuple[RadarConfig, str]:
-    """A configuration by preset name, from a ``.cfg`` or ``.mmwave.json`` file, or as it is given.
+    """Load a configuration by preset name, or from a ``.cfg`` or ``.mmwave.json`` file, or return one as it is.
 
-    Returns the configuration and the text it was read from (``write_cfg`` of it where there is none).
+    Returns the configuration and the text it was read from (``write_cfg`` of it if there is none).
 
     Raises:
-        InputError: no such preset or file, or its content cannot be used.
+        InputError: unknown preset or missing file, or unusable content.
     """
     if not isinstance(source, RadarConfig):
         source = PRESETS.get(str(source), source)

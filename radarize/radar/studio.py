@@ -14,11 +14,11 @@ from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, Firing, RadarConfig,
 
 
 def load_studio(path: Path, setup: Path | None = None) -> tuple[RadarConfig, str]:
-    """Configuration and text of a ``.mmwave.json`` file.
+    """Load configuration and text of a ``.mmwave.json`` file.
 
     Args:
         path: the settings.
-        setup: ``.setup.json`` that names the device; by default the one beside `path`, if there is exactly one.
+        setup: ``.setup.json`` with the device; default: the one beside `path`, if there is exactly one.
 
     Raises:
         InputError: a file is unreadable, or a setting is missing or not covered.
@@ -32,7 +32,7 @@ def load_studio(path: Path, setup: Path | None = None) -> tuple[RadarConfig, str
 
 
 def load_json(path: Path) -> dict:
-    """A JSON object from a file, its fractions as exact decimals.
+    """Read a JSON object from a file, with fractions as exact decimals.
 
     Raises:
         InputError: unreadable, or not a JSON object.
@@ -45,11 +45,11 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
 
     Args:
         text: content of a ``.mmwave.json`` file.
-        name: what errors call it, usually the path.
-        device: ``mmWaveDevice`` of the setup file, e.g. ``iwr6843``; decides the board together with the band.
+        name: name in error messages, usually the path.
+        device: ``mmWaveDevice`` of the setup file, e.g. ``iwr6843``; determines the board together with the band.
 
     Raises:
-        InputError: naming the file and field.
+        InputError: names the file and field.
     """
     devices = _Node(name, "", parse_json(text, name, Decimal)).items("mmWaveDevices")
     if len(devices) != 1:
@@ -109,7 +109,7 @@ def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[Firing, ...], "_Node"]:
         chirp = matching[-1]
         for field in ("startFreqVar_MHz", "freqSlopeVar_KHz_usec", "idleTimeVar_usec", "adcStartTimeVar_usec"):
             if chirp.decimal(field) != 0:
-                raise chirp.error(field, chirp.get(field), "0 (all chirps alike)")
+                raise chirp.error(field, chirp.get(field), "0 (the same for all chirps)")
         if not (mask := chirp.integer("txEnable")):
             raise chirp.error("txEnable", 0, "a transmitter at least")
         order.append(firing_of(mask))
@@ -121,7 +121,7 @@ def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[Firing, ...], "_Node"]:
 
 
 class _Node:
-    """A JSON object with its path, so that errors can say where."""
+    """JSON object with its path, for error messages."""
 
     def __init__(self, file: str, path: str, data: object):
         if not isinstance(data, dict):
@@ -140,7 +140,7 @@ class _Node:
         return _Node(self.file, f"{self.path}.{field}".lstrip("."), self.get(field))
 
     def items(self, field: str) -> list["_Node"]:
-        """Entries of a list; a single one may stand there without a list, as some programs write it."""
+        """Entries of a list; a single entry may appear without a list, as some programs write it."""
         value = self.get(field)
         if isinstance(value, dict) and value:
             return [self.node(field)]

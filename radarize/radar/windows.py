@@ -1,4 +1,4 @@
-"""Windows that numpy lacks. scipy.signal has them, but loading it is a fifth of every command's start."""
+"""Window functions missing in numpy; scipy.signal has them, but its import takes a fifth of every command's start."""
 
 from collections.abc import Callable
 
@@ -9,13 +9,13 @@ Window = Float[np.ndarray, "count"]
 
 
 def periodic(window: Callable[[int], Window], count: int) -> Window:
-    """One period of a window of numpy's, which are symmetric: for spectra."""
+    """One period of a window of numpy's, which are symmetric, for spectra."""
     return window(count + (count > 1))[:count]  # the next period's first value comes as well; a single value is 1
 
 
 def taylor(count: int, near: int = 4, level: float = 25.0) -> Window:
-    """Whose `near` first sidelobes are about `level` dB down, 1 in the middle (Carrara, Goodman, Majewski, "Spotlight
-    synthetic aperture radar", 1995, appendix D)."""
+    """Taylor window with the `near` first sidelobes at about -`level` dB, 1 in the middle (Carrara, Goodman, Majewski,
+    "Spotlight synthetic aperture radar", 1995, appendix D)."""
     if count < 3:
         return np.ones(count)
     a = np.arccosh(10 ** (level / 20)) / np.pi

@@ -1,4 +1,4 @@
-"""What goes through the pipeline: a batch of frames, and what is made of them, once, when somebody asks for it."""
+"""Batch of frames with its products (spectra, maps, points), each computed once on first use."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -18,13 +18,13 @@ from radarize.signal.maps import MapMaker
 from radarize.signal.points import DENSE, PointClouds
 from radarize.signal.receivers import Receivers
 
-#: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
-#: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
+#: Smallest fraction of its chirps with which a frame is used. On a simulated walk, with the rest of each burst lost,
+#: 95 % of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
 LEAST_SHARE = 1 / 8
 
 
 class Signal:
-    """What turns samples of one radar into spectra, maps and points; all batches of a stream share it."""
+    """Signal processing of one radar: spectra, maps and points; shared by all batches of a stream."""
 
     def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
         self.radar = radar
@@ -33,12 +33,12 @@ class Signal:
 
     @cached_property
     def maker(self) -> MapMaker:
-        """Of the maps that networks see."""
+        """Maker of the networks' input maps."""
         return MapMaker(self.radar)
 
     @cached_property
     def clouds(self) -> PointClouds:
-        """Of many sparse points.
+        """Point clouds with many sparse points.
 
         Raises:
             InputError: see `PointClouds`.
@@ -47,19 +47,19 @@ class Signal:
 
 
 class Batch:
-    """Consecutive frames, none of them lost or silent.
+    """Consecutive frames, none of them lost or without signal.
 
     Args:
-        signal: what makes something of them.
-        samples: raw I/Q; None where nothing but maps is known.
-        stamps: starts of the frames' first chirps, s.
+        signal: signal processing of the radar.
+        samples: raw I/Q; None if only maps are available.
+        stamps: start times of the frames' first chirps, s.
         valid: False where a chirp was lost; all true if None.
-        numbers: of the frames as the radar sent them, see `Numbering`; from 0 if None.
-        maps: that are known already, such as pictures of a radar whose samples nobody kept.
+        numbers: frame numbers as sent by the radar, see `Numbering`; default: from 0.
+        maps: maps that are available already, such as those of a recording without samples.
 
     Attributes:
-        flaws: of the frames; None where nobody looked.
-        ranges: scans of the frames, once they are extracted (`radarize.pipeline.pipeline.ScanExtractor`), m.
+        flaws: defects of the frames; None if they were not examined.
+        ranges: scans of the frames, once extracted (`radarize.pipeline.pipeline.ScanExtractor`), m.
         known: maps by name.
     """
 
@@ -85,15 +85,16 @@ class Batch:
 
     @cached_property
     def centers(self) -> Float[np.ndarray, "frame"]:
-        """Burst centres, s: the instants that motion and scans belong to."""
+        """Burst centres, s: the times to which motion and scans refer."""
         return self.stamps + self.signal.radar.burst_center
 
     @cached_property
     def folded(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """See `Heatmaps.spectrum`; broken receivers are filled in.
+        """Spectrum with broken receivers filled in, before the ambiguity of speeds is resolved; see
+        `Heatmaps.spectrum`.
 
         Raises:
-            InputError: nothing but maps is known.
+            InputError: only maps are available.
         """
         if self.samples is None:
             raise InputError(f"frames from {self.stamps[0]:.3f} s on have no samples, only {', '.join(self.known)}")
@@ -103,17 +104,17 @@ class Batch:
 
     @cached_property
     def aliases(self) -> Int[np.ndarray, "frame doppler"]:
-        """See `Aliases.of`."""
+        """Number of unambiguous spans to add to the speed of each Doppler bin, see `Aliases.of`."""
         with stage("spectra"):
             return self.signal.aliases.of(self.folded)
 
     @cached_property
     def spectrum(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """`folded`, with the antennas of each bin as if sampled at once at the speed that it means."""
+        """`folded` with ambiguity resolved: the delays between transmitters compensated at each bin's true speed."""
         return self.signal.heatmaps.unfolded(self.folded, self.aliases)
 
     def maps(self, names: tuple[str, ...]) -> dict[str, Shaped[np.ndarray, "frame row azimuth"]]:
-        """Maps that networks see, dB, see `radarize.signal.maps`."""
+        """Input maps of networks, dB, see `radarize.signal.maps`."""
         missing = tuple(name for name in names if name not in self.known)
         if missing:
             self.known.update(self.signal.maker.of(self.spectrum, missing))
@@ -121,23 +122,23 @@ class Batch:
 
     @cached_property
     def points(self) -> tuple[Float[np.ndarray, "point 6"], Int[np.ndarray, "point"]]:
-        """Sparse points and the frame of the batch that each belongs to, see `PointClouds`."""
+        """Sparse points and the index of the frame of each, see `PointClouds`."""
         with stage("points"):
             return self.signal.clouds.of(self.signal.heatmaps, self.spectrum)
 
 
 class Preprocessor:
-    """Makes batches of what a radar delivers.
+    """Make batches from the frames of a radar.
 
     Args:
-        signal: of a radar that delivers no more than what is taken; see `RadarConfig.every`.
-        every: only frames are taken whose number is a multiple of it.
+        signal: signal processing of a radar with the frame rate after decimation; see `RadarConfig.every`.
+        every: use only frames whose number is a multiple of this.
 
     Attributes:
-        taken: frames so far.
-        lost: of these, frames that are lost, nearly lost, or silent: left out, for a gap says more than nothing does.
-        disturbed: chirps that were disturbed, which count as lost.
-        numbering: of all frames, also of those that are not taken.
+        taken: number of frames used so far.
+        lost: number of these that are lost, nearly lost, or without signal, and left out.
+        disturbed: number of disturbed chirps, which count as lost.
+        numbering: numbers of all frames, also of those not used.
     """
 
     def __init__(self, signal: Signal, every: int = 1):
@@ -151,7 +152,7 @@ class Preprocessor:
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Batch:
-        """The next frames, see `Batch`, without those that are left out."""
+        """Process the next frames; returns a `Batch` without those that are left out."""
         stamps = np.asarray(stamps, float)
         numbers = self.numbering.of(stamps)
         valid = np.ones(samples.shape[:3], bool) if valid is None else valid
@@ -171,7 +172,7 @@ class Preprocessor:
     def process_maps(
         self, maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]], stamps: Float[np.ndarray, "frame"]
     ) -> Batch:
-        """The next frames of a recording that holds maps and no samples."""
+        """Process the next frames of a recording with maps and without samples."""
         numbers = self.numbering.of(stamps)
         wanted = numbers % self.every == 0
         self.taken += int(np.count_nonzero(wanted))

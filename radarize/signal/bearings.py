@@ -1,4 +1,4 @@
-"""Directions of scans."""
+"""Bearings of scans."""
 
 import numpy as np
 

@@ -1,11 +1,11 @@
 """Heat maps of raw frames: range, Doppler and azimuth spectra, batched over frames in torch.
 
 Every map starts from one spectrum per frame (`Heatmaps.spectrum`): calibrated, windowed, transformed over samples and
-loops, and with the delay between TDM slots taken out again per Doppler bin. From there on all virtual antennas look
-as if they had been sampled at once, and beamforming is a product with steering vectors of their true positions.
+loops, and compensated for the delay between TDM slots per Doppler bin. After that all virtual antennas appear
+simultaneously sampled, and beamforming is a product with steering vectors of their true positions.
 
-Scaling, with amplitudes in ADC counts: a point echo of amplitude A reads A^2 at its peak in every map. Axes that a map
-has no resolution in (Doppler in range-azimuth, range in Doppler-azimuth) are summed, so that echoes add in power.
+Scaling, with amplitudes in ADC counts: a point echo of amplitude A has the peak A^2 in every map. Axes that a map
+does not have (Doppler in range-azimuth, range in Doppler-azimuth) are summed, so that echoes add in power.
 """
 
 from functools import cache, cached_property
@@ -34,16 +34,16 @@ class HeatmapConfig(Frozen):
 
 
 class Heatmaps:
-    """Heat maps for one radar configuration; holds windows and steering matrices.
+    """Heat maps for one radar configuration; stores windows and steering matrices.
 
-    Windows trade resolution for sidelobes: Hann over samples, whose sidelobes fall by 18 dB an octave, because the
-    transmitter's leakage in the lowest bins must not show at every range as something that stands still; Hamming
-    (-43 dB) over loops, because a wall's flash is 40 dB above furniture; Taylor (-25 dB) over the few antennas, which
-    widens the 12.8 deg beam of 8 elements to 15 deg.
+    Windows trade resolution for sidelobes: Hann over samples, whose sidelobes fall by 18 dB per octave, because the
+    transmitter's leakage in the lowest bins must not appear as a static target at every range; Hamming
+    (-43 dB) over loops, because a wall's specular reflection is 40 dB above furniture; Taylor (-25 dB) over the few
+    antennas, which widens the 12.8 deg beam of 8 elements to 15 deg.
 
     Args:
         azimuths: (azimuth,) columns of all maps, rad, ascending.
-        settings: of the beamformers.
+        settings: settings of the beamformers.
 
     Attributes:
         ranges: (range,) m, `config.range_bias` subtracted.
@@ -61,7 +61,7 @@ class Heatmaps:
         self._range_window = self._tensor(np.hanning(config.samples), torch.float32)
         self._range_window /= self._range_window.sum()
         self._loop_window = self._tensor(np.hamming(config.loops), torch.float32)
-        # A closing target's phase falls: frequency -2 v / wavelength. A slot's delay is turned back at that rate.
+        # A closing target's phase falls: frequency -2 v / wavelength. A slot's delay is compensated at that rate.
         delay = np.asarray(config.slot) * config.chirp_time
         turn = np.exp(4j * np.pi / config.wavelength * self.velocities[:, None] * delay)
         self._slots = self._tensor(turn[:, :, None], torch.complex64)  # (doppler, tx, 1)
@@ -94,15 +94,14 @@ class Heatmaps:
         adc: Real[np.ndarray, "frame loop tx rx sample 2"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """Range-Doppler spectrum of every virtual antenna, flat (tx, rx), TDM delays compensated.
+        """Range-Doppler spectrum of every virtual antenna, flat (tx, rx), with TDM delays compensated.
 
-        The compensation takes each cell at its bin's speed; echoes beyond `config.max_velocity` alias and keep a
-        phase step of 2 pi slot / slots between transmitters, see `unfolded`. Lost chirps weigh nothing and the
-        remaining ones of the same transmitter more, so that transmitters stay balanced; a transmitter without any
-        chirp reads zero.
+        The compensation uses each bin's speed; echoes beyond `config.max_velocity` alias and keep a phase step of 2 pi
+        slot / slots between transmitters, see `unfolded`. Lost chirps have zero weight and the remaining ones of the
+        same transmitter a larger one, so that transmitters stay balanced; a transmitter without any chirp gives zero.
 
         Args:
-            adc: raw samples; a torch tensor is taken as well.
+            adc: raw samples, also as a torch tensor.
             valid: False where a chirp was lost; all true if None.
 
         Raises:
@@ -127,7 +126,7 @@ class Heatmaps:
         spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
         aliases: Int[np.ndarray, "frame doppler"],
     ) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """A spectrum whose bins mean speeds so many unambiguous spans higher, with the TDM delays of these."""
+        """Shift the speeds of a spectrum's bins up by unambiguous spans, with the TDM delays compensated for them."""
         if not aliases.any():
             return spectrum
         turn = 2 * np.pi * aliases[..., None] * np.repeat(self.config.slot, len(self.config.rx))
@@ -143,20 +142,20 @@ class Heatmaps:
 
     @cached_property
     def _loop_energy(self) -> float:
-        """What the Doppler bins of a unit echo sum to: loops * sum(w^2) / sum(w)^2."""
+        """Sum over the Doppler bins of a unit echo: loops * sum(w^2) / sum(w)^2."""
         window = self._loop_window
         return float(self.config.loops * (window**2).sum() / window.sum() ** 2)
 
     @cached_property
     def _range_energy(self) -> float:
-        """What the range bins of a unit echo sum to."""
+        """Sum over the range bins of a unit echo."""
         return float(self.config.samples * (self._range_window**2).sum())
 
     @staticmethod
     def limited(spectrum: torch.Tensor, limit: float = 300.0) -> torch.Tensor:
-        """A spectrum whose range-Doppler cells level off at `limit` times the noise floor, their phases kept.
+        """Limit a spectrum's range-Doppler cells to `limit` times the noise floor, preserving phases.
 
-        A wall's specular flash is 40 dB above its own texture: unlimited, its sidelobes are all that sums show.
+        A wall's specular reflection is 40 dB above its own texture: without a limit, its sidelobes dominate all sums.
         """
         power = spectrum.real.square().sum(dim=-1) + spectrum.imag.square().sum(dim=-1)
         floor = power.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
@@ -179,13 +178,13 @@ class Heatmaps:
 
         Args:
             adc, valid: see `spectrum`.
-            method: ``"bartlett"`` (windowed sum) or ``"capon"`` (minimum variance, Capon 1969), sharper and with
-                powers that fall short of A^2 where echoes crowd.
+            method: ``"bartlett"`` (windowed sum) or ``"capon"`` (minimum variance, Capon 1969), sharper, but with
+                powers below A^2 where echoes are dense.
         """
         return self.range_azimuth_of(self.spectrum(adc, valid), method)
 
     def range_azimuth_of(self, spectrum: torch.Tensor, method: str = "bartlett") -> torch.Tensor:
-        """`range_azimuth` of a spectrum at hand."""
+        """`range_azimuth` from an existing spectrum."""
         covariance = self.covariance(spectrum, self.row)
         return self._capon(covariance) if method == "capon" else self._bartlett(covariance, self._steering)
 
@@ -205,7 +204,7 @@ class Heatmaps:
         return self.elevation_aware_of(self.spectrum(adc, valid))
 
     def elevation_aware_of(self, spectrum: torch.Tensor) -> torch.Tensor:
-        """`elevation_aware` of a spectrum at hand."""
+        """`elevation_aware` from an existing spectrum."""
         x, steering = self._paired(spectrum)
         return self._bartlett(self.covariance(x, np.arange(len(steering))), steering)
 
@@ -225,7 +224,7 @@ class Heatmaps:
     def _capon(self, covariance: torch.Tensor) -> torch.Tensor:
         antennas = covariance.shape[-1]
         level = covariance.diagonal(dim1=-2, dim2=-1).real.mean(dim=-1)
-        # The floor keeps all-zero cells (lost frames) regular.
+        # The floor keeps the matrices of all-zero cells (lost frames) regular.
         load = self.settings.loading * level + 1e-12 * level.amax(dim=-1, keepdim=True) + 1e-30
         loaded = covariance + load[..., None, None] * torch.eye(antennas)
         scale = (level + load)[..., None]
@@ -248,13 +247,13 @@ class Heatmaps:
         adc: Real[np.ndarray, "frame loop tx rx sample 2"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Float32[torch.Tensor, "frame doppler azimuth"]:
-        """Power over speed and azimuth, summed over range: a static world draws v cos(phi - theta)."""
+        """Power over speed and azimuth, summed over range: a static world appears at v cos(phi - theta)."""
         return self.doppler_azimuth_of(self.spectrum(adc, valid))
 
     def doppler_azimuth_of(
         self, spectrum: torch.Tensor, method: str = "bartlett", elevation_aware: bool = False
     ) -> torch.Tensor:
-        """`doppler_azimuth` of a spectrum at hand.
+        """`doppler_azimuth` from an existing spectrum.
 
         Args:
             spectrum: see `spectrum`.
@@ -275,7 +274,7 @@ class Heatmaps:
         return self._capon(covariance) if sharp else self._bartlett(covariance, steering)
 
     def range_doppler_of(self, spectrum: torch.Tensor) -> Float32[torch.Tensor, "frame range doppler"]:
-        """Power over range and speed of a spectrum at hand, averaged over all antennas."""
+        """Power over range and speed from an existing spectrum, averaged over all antennas."""
         return spectrum.abs().square().mean(dim=-1)
 
     def range_profile(
@@ -287,5 +286,5 @@ class Heatmaps:
         return self.range_profile_of(self.spectrum(adc, valid))
 
     def range_profile_of(self, spectrum: torch.Tensor) -> torch.Tensor:
-        """`range_profile` of a spectrum at hand."""
+        """`range_profile` from an existing spectrum."""
         return spectrum.abs().square().sum(dim=2).mean(dim=-1) / self._loop_energy

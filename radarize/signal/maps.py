@@ -1,16 +1,16 @@
-"""What the networks see of a frame: four heat maps in dB, small enough to keep instead of the samples.
+"""Input maps of the networks: four heat maps per frame in dB, small enough to store instead of the samples.
 
 | map | axes | for |
 |---|---|---|
 | range_azimuth | range x azimuth, row of 8 antennas, Capon | rotation, segmentation |
-| elevation_aware | range x azimuth, pairs that look at the horizon, Bartlett | segmentation |
+| elevation_aware | range x azimuth, antenna pairs focused on the horizon, Bartlett | segmentation |
 | doppler_azimuth | Doppler x azimuth, row of 8 antennas, Capon, limited | translation |
-| doppler_elevation_aware | Doppler x azimuth, pairs that look at the horizon, Bartlett, limited | translation |
+| doppler_elevation_aware | Doppler x azimuth, antenna pairs focused on the horizon, Bartlett, limited | translation |
 
-Azimuth has 80 columns of 1.5 deg, symmetric about the boresight, so that a flip is a mirror: Capon's ridges are that
-wide. Range and Doppler keep their bins. Maps over Doppler are of the limited spectrum (`Heatmaps.limited`), or a single
-flash would drown the ridge on which the whole static world lies. Decibels are of squared ADC counts, rounded to a
-quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
+Azimuth has 80 columns of 1.5 deg, the width of Capon's ridges, symmetric about the boresight, so that a flip is a
+mirror image. Range and Doppler keep their bins. Maps over Doppler use the limited spectrum (`Heatmaps.limited`),
+otherwise a single specular reflection would mask the ridge of the static world. Decibels refer to squared ADC counts,
+rounded to a quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of the size.
 """
 
 from abc import ABC, abstractmethod
@@ -27,29 +27,29 @@ from radarize.io.stopwatch import stage
 from radarize.radar.config import RadarConfig
 from radarize.signal.heatmaps import Heatmaps
 
-#: Maps by name, with what they are.
+#: Descriptions of the maps by name.
 MAPS = {
     "range_azimuth": "power over range and azimuth",
     "elevation_aware": "power over range and azimuth near the horizon, of antenna pairs",
     "doppler_azimuth": "power over closing speed and azimuth",
     "doppler_elevation_aware": "power over closing speed and azimuth near the horizon, of antenna pairs",
 }
-#: Maps as networks take them.
+#: Maps as input of networks.
 Maps = Float[Tensor, "item frame map row azimuth"]
 #: Columns, rad, positive to the left, ascending.
 AZIMUTHS = np.radians(np.arange(-59.25, 60.0, 1.5))
-#: dB; what is weaker reads this. An ADC's rounding alone gives about as much.
+#: Lower limit, dB; about the level of an ADC's rounding.
 FLOOR = -30.0
 STEP = 0.25
 
 
 @dataclass(frozen=True)
 class Axes:
-    """Cells of a map.
+    """Axes of a map.
 
     Attributes:
         rows: range bins, or Doppler bins.
-        step: m, or m/s, from row to row.
+        step: m, or m/s, between rows.
         azimuths: of columns, rad, ascending to the left.
         centred: rows are speeds, m/s, zero in the middle; otherwise ranges, m, from zero on.
     """
@@ -61,13 +61,13 @@ class Axes:
 
 
 class Maker(ABC):
-    """Makes the maps that a method's networks see, of one radar configuration.
+    """Interface of the makers of a method's input maps, for one radar configuration.
 
     Attributes:
-        maps: by name, what they are.
-        history: frames before its own that a map needs.
-        warmup: first frames of a recording that networks do not see.
-        physical: rows are metres or m/s, so that a network can be shown those of any chirp, see `Resampling`.
+        maps: descriptions by name.
+        history: number of earlier frames that a map needs.
+        warmup: number of first frames of a recording without maps.
+        physical: whether rows are in metres or m/s, so that a network can use those of any chirp, see `Resampling`.
     """
 
     maps: dict[str, str]
@@ -76,22 +76,22 @@ class Maker(ABC):
 
     @abstractmethod
     def __init__(self, config: RadarConfig):
-        """For frames of that radar."""
+        """Prepare for frames of a radar configuration."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all maps."""
+        """Names of all maps."""
         return tuple(self.maps)
 
     @staticmethod
     def stride(config: RadarConfig) -> int:
-        """Frames from one that networks see to the next: they see every frame, unless told otherwise."""
+        """Distance in frames between the frames that networks use; 1 unless overridden."""
         return 1
 
     @staticmethod
     @abstractmethod
     def axes(config: RadarConfig, name: str) -> Axes:
-        """Rows and columns of a map."""
+        """Axes of a map."""
 
     @abstractmethod
     def __call__(
@@ -101,12 +101,12 @@ class Maker(ABC):
         names: tuple[str, ...] | None = None,
         frames: slice | Int[np.ndarray, "map"] = slice(None),
     ) -> dict[str, Float[np.ndarray, "map row azimuth"]]:
-        """Maps of some of consecutive frames.
+        """Compute maps of some consecutive frames.
 
         Args:
             adc, valid: see `Heatmaps.spectrum`.
             names: of `self.names`; all if None.
-            frames: whose maps are wanted.
+            frames: frames to compute.
 
         Raises:
             InputError: samples that do not fit the configuration.
@@ -114,9 +114,9 @@ class Maker(ABC):
 
 
 class MapMaker(Maker):
-    """Makes the maps of one radar configuration, dB.
+    """Input maps of one radar configuration, dB.
 
-    Without antennas of two heights, maps near the horizon are the row's, by Bartlett as well: they differ in what is
+    Without antennas of two heights, maps near the horizon are the row's, by Bartlett as well: they include echoes from
     above and below.
     """
 
@@ -150,11 +150,11 @@ class MapMaker(Maker):
     def of(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], names: tuple[str, ...] | None = None
     ) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
-        """Maps of a spectrum at hand."""
+        """Maps from an existing spectrum."""
         heatmaps, names = self.heatmaps, names or self.names
         paired = heatmaps.pairs is not None
         with stage("maps"):
-            # Only maps of Doppler look at it.
+            # Only Doppler maps use the limited spectrum.
             limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else spectrum
             makers = {
                 "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
@@ -173,10 +173,10 @@ def _decibels(power: torch.Tensor) -> np.ndarray:
 
 
 def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...], maker: Maker, stride: int = 1) -> dict:
-    """Maps of every so manieth of frames start...stop-1: as stored, or made from the samples, which gives the same.
+    """Maps of every N-th of frames start...stop-1 (N = `stride`): as stored, or made from the samples; both are equal.
 
     Raises:
-        InputError: a map that the recording neither holds nor can make.
+        InputError: a map that is not stored and cannot be made.
     """
     for name in names:
         if name not in maker.names:

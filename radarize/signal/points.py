@@ -1,12 +1,12 @@
-"""The sparse point cloud that TI's demo firmware makes on the chip, from raw frames.
+"""Sparse point cloud of TI's demo firmware, computed from raw frames.
 
 The steps of the mmWave SDK 3.x demo (`Mmwave demo data processing chain`), with its default settings:
 
     range transform (Blackman window, padded to a power of two) -> static clutter removal, where asked for
     -> Doppler transform (Hann window) -> mean level of all virtual antennas, in logarithms
     -> CFAR over range (smallest of both sides), and over Doppler (mean of both sides)
-    -> only the peaks among their neighbours -> delays between transmitters turned back at the cell's speed
-    -> azimuth transform of the longest row, its peak and perhaps a second one
+    -> only local maxima -> delays between transmitters compensated at the cell's speed
+    -> azimuth transform of the longest row, its peak and optionally a second one
     -> elevation from the phase between that row and the nearest one above or below
 """
 
@@ -43,11 +43,11 @@ class PointCloudConfig(Frozen):
     Attributes:
         range_cfar: ``cfarCfg -1 0 2 8 4 3 0 15 1``.
         doppler_cfar: ``cfarCfg -1 1 0 4 2 3 1 15 1``.
-        clutter_removal: take the mean over loops out, and with it what stands still (``clutterRemoval``).
-        second_peak: another point on the same range and speed if its power is more than this share of the first's
+        clutter_removal: subtract the mean over loops, and with it static targets (``clutterRemoval``).
+        second_peak: power relative to the first peak from which a second point is added at the same range and speed
             (``multiObjBeamForming``); above 1: never.
         angles: azimuth cells.
-        min_range: nearer cells hold the transmitters' leakage, m (``cfarFovCfg``).
+        min_range: smallest range, beyond the transmitters' leakage, m (``cfarFovCfg``).
     """
 
     range_cfar: Cfar = Cfar(window=8, guard=4, smallest=True)
@@ -66,7 +66,7 @@ DENSE = PointCloudConfig(
 
 
 class PointClouds:
-    """Makes point clouds for one radar configuration.
+    """Point clouds for one radar configuration.
 
     Raises:
         InputError: the configuration has too few loops or samples for the CFAR windows.
@@ -121,7 +121,7 @@ class PointClouds:
 
         Args:
             adc: raw samples.
-            valid: False where a chirp was lost; lost chirps weigh nothing.
+            valid: False where a chirp was lost; lost chirps have zero weight.
 
         Returns:
             x forward, y left, z up (m), radial speed (m/s, closing positive: the firmware's sign is the opposite),
@@ -139,10 +139,10 @@ class PointClouds:
     def of(
         self, heatmaps: Heatmaps, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> tuple[Float[np.ndarray, "point 6"], Int[np.ndarray, "point"]]:
-        """The same detections in a spectrum at hand, with its windows and bins instead of the chip's.
+        """Detect points in an existing spectrum, with its windows and bins instead of the chip's.
 
         Args:
-            heatmaps: that made it.
+            heatmaps: maker of the spectrum.
             spectrum: see `Heatmaps.spectrum`.
         """
         cube = spectrum.permute(0, 2, 3, 1).cpu().numpy()
@@ -154,9 +154,9 @@ class PointClouds:
         """Points of spectra (frame, doppler, antenna, range), and their frames.
 
         Args:
-            cube: of spectra.
-            ranges, velocities: of its cells.
-            turn: (doppler, antenna) what turns delays between transmitters back.
+            cube: spectra.
+            ranges, velocities: axes of its cells.
+            turn: (doppler, antenna) phase factors that compensate the delays between transmitters.
         """
         level, noise, found = self.detect(cube, ranges)
         frame, near, speed = np.nonzero(found)
@@ -193,8 +193,8 @@ class PointClouds:
         Float[np.ndarray, "frame range doppler"],
         Bool[np.ndarray, "frame range doppler"],
     ]:
-        """Level (dB), noise around (dB) and whether it is a detection, per cell of a spectrum; ranges are the chip's
-        unless told."""
+        """Level (dB), surrounding noise (dB) and detection mask of each cell of a spectrum; default ranges: the
+        chip's."""
         power = cube.real**2 + cube.imag**2
         level = 10 * np.log10(power + np.float32(1e-9)).mean(axis=2).transpose(0, 2, 1)
         over_range, over_doppler = self.settings.range_cfar, self.settings.doppler_cfar
@@ -208,14 +208,15 @@ class PointClouds:
     def _directions(
         self, x: Complex[np.ndarray, "detection antenna"]
     ) -> tuple[Int[np.ndarray, "point"], Float[np.ndarray, "point"], Float[np.ndarray, "point"]]:
-        """Direction cosines to the left and up of one or two peaks per detection, and whose they are."""
-        # One product a detection: those of all at once are rounded by how many there are, and so by a batch's size.
+        """Direction cosines to the left and up of one or two peaks per detection, and the index of the detection."""
+        # One product per detection: the rounding of a joint product would depend on the number of detections in a
+        # batch.
         beams = (x[:, None, self._row] @ self._steering)[:, 0]
         power = np.abs(beams) ** 2
         peak = (power >= np.roll(power, 1, axis=1)) & (power > np.roll(power, -1, axis=1))
         order = np.argsort(np.where(peak, -power, 0.0), axis=1, kind="stable")[:, :2]
         best = np.take_along_axis(np.where(peak, power, 0.0), order, axis=1)
-        if len(self._row) == 1:  # a single antenna tells no direction: straight ahead
+        if len(self._row) == 1:  # a single antenna gives no direction: straight ahead
             order, best = np.full_like(order, self.settings.angles // 2), np.tile([1.0, 0.0], (len(x), 1))
         taken = np.column_stack([np.ones(len(x), bool), best[:, 1] > self.settings.second_peak * best[:, 0]])
         which, rank = np.nonzero(taken)
@@ -228,7 +229,7 @@ class PointClouds:
 
 
 def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
-    """Mean level (dB) of the cells around each along an axis; at the ends of one that is no circle, of one side."""
+    """Mean level (dB) of the cells around each along an axis; at the ends of a non-cyclic one, of one side."""
     reach = cfar.window + cfar.guard
     level = np.moveaxis(level, axis, -1)
     padded = np.pad(level, [(0, 0)] * (level.ndim - 1) + [(reach, reach)], mode="wrap")

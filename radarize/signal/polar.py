@@ -1,8 +1,8 @@
-"""Polar pictures as RadarHD's data set has them: what an array of eight antennas hears, and what a lidar sees.
+"""Polar images of RadarHD's data set: of an array of eight antennas, and of a lidar.
 
 Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023, and the program that made its data set.
-A picture has 256 rows of range up to 10.8 m, and columns of azimuth from -90 to 90 deg, positive to the left: 64 of the
-radar's, 512 of the lidar's. Measures of their paper are taken on a Cartesian grid (`cartesian`).
+An image has 256 rows of range up to 10.8 m, and columns of azimuth from -90 to 90 deg, positive to the left: 64 for the
+radar, 512 for the lidar. The measures of the paper use a Cartesian grid (`cartesian`).
 """
 
 from collections.abc import Sequence
@@ -22,19 +22,19 @@ ROWS, COLUMNS, BEAMS = 256, 64, 512
 REACH = 10.8
 RANGES = np.linspace(0, REACH, ROWS)
 AZIMUTHS, BEAM_AZIMUTHS = (np.radians(np.linspace(-90, 90, columns)) for columns in (COLUMNS, BEAMS))
-#: m: points of a lidar's picture are no higher or lower than this over the lidar.
+#: m: largest height of a lidar's points above or below the lidar.
 SLAB = 0.3
-#: Kept is what has at least this share of the largest magnitude beyond the first bins, where transmitters leak.
+#: Smallest magnitude that is kept, relative to the largest one beyond the first bins with the transmitters' leakage.
 THRESHOLD, LEAKAGE = 0.05, 6
 #: Transmitters of the pictures, as published: eight antennas in a row. The pictures themselves have the beam of four,
 #: so one transmitter's: strong echoes of the 25 training walks fit it within 2.5 dB (median), and the beam of eight
 #: within 8.3 dB (`benchmarks.realism`).
 PUBLISHED, MEASURED = (0, 2), (0,)
-#: m, half of the square that points may lie in; rad, of what the radar's pictures keep to either side.
+#: m, half of the square of the points; rad, azimuths to either side that radar images keep.
 _SQUARE, _FIELD = 10.0, np.radians(70)
 #: Edges of the measures' grid, m: x ahead, y to the left.
 GRID = np.linspace(0, REACH, 256), np.linspace(-REACH, REACH, 512)
-#: A radar's pictures in a recording, and a lidar's.
+#: Names of radar and lidar images in a recording.
 PICTURE = "maps/picture"
 LIDAR = Stream(
     (ROWS, BEAMS // 8), "u1", "",
@@ -43,7 +43,7 @@ LIDAR = Stream(
 
 
 class Cells(NamedTuple):
-    """Cells of sine of azimuth (left first) and range that lie in a picture, and the picture's pixels they go to."""
+    """Cells of sine of azimuth (left first) and range within an image, and the image's pixels that they map to."""
 
     cell: Int[np.ndarray, "cell"]
     pixel: Int[np.ndarray, "cell"]
@@ -51,7 +51,7 @@ class Cells(NamedTuple):
 
 @cache
 def cells(config: RadarConfig) -> Cells:
-    """Of a radar's range bins, which end at the unambiguous range of complex samples, to the centimetre."""
+    """Cells of a radar's range bins up to the unambiguous range of complex samples, to the centimetre."""
     sine = np.linspace(1, -1, COLUMNS)[:, None]
     ranges = np.linspace(0, round(config.max_range, 2), config.samples)
     x, y = ranges * np.sqrt(1 - sine**2), ranges * sine
@@ -66,7 +66,7 @@ def cells(config: RadarConfig) -> Cells:
 def antennas(
     adc: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig, transmitters: Sequence[int] = PUBLISHED
 ) -> Complex128[np.ndarray, "frame antenna range"]:
-    """Of the first loop, over range, without windows: four receivers of each transmitter, in a row.
+    """Range spectra of the first loop, without windows: four receivers of each transmitter, in a row.
 
     Raises:
         InputError: a radar without these transmitters, or without four receivers.
@@ -81,12 +81,12 @@ def antennas(
 def pictures(
     adc: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig, transmitters: Sequence[int] = PUBLISHED
 ) -> UInt8[np.ndarray, "frame range azimuth"]:
-    """Pictures of frames: decibels from the least (0) to the largest (255) that is kept; 0 where nothing is.
+    """Images of frames: decibels from the smallest (0) to the largest (255) that is kept; 0 in empty pixels.
 
     Args:
         adc: raw I/Q.
         config: radar configuration.
-        transmitters: whose echoes are heard, see `PUBLISHED` and `MEASURED`.
+        transmitters: transmitters to use, see `PUBLISHED` and `MEASURED`.
 
     Raises:
         InputError: see `antennas`.
@@ -104,12 +104,12 @@ def pictures(
 
 
 def pictured(recording: Recording) -> bool:
-    """Whether a recording holds a radar's pictures and no samples."""
+    """Whether a recording has a radar's images and no samples."""
     return not recording.has_samples and recording.has(PICTURE)
 
 
 def power(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float32[np.ndarray, "frame range azimuth"]:
-    """What pictures show, the strongest cell of each 1: their greys are even steps of decibels, down to `THRESHOLD`."""
+    """Power of images relative to their strongest cell; grey values are linear in decibels, down to `THRESHOLD`."""
     share = pictures.astype(np.float32) / 255
     return np.where(pictures > 0, np.float32(THRESHOLD**2) ** (1 - share), np.float32(0))
 
@@ -117,7 +117,7 @@ def power(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float32[np.ndar
 def lidar_pixels(
     points: Float[np.ndarray, "point 3"],
 ) -> Int[np.ndarray, "pixel 2"]:
-    """Rows and columns of a lidar's picture that hold points (x forward, y left, z up, m) of its own height."""
+    """Rows and columns of a lidar's image that contain points (x forward, y left, z up, m) near its own height."""
     x, y, z = points.T
     inside = (x > 0) & (x <= _SQUARE) & (np.abs(y) <= _SQUARE) & (np.abs(z) <= SLAB)
     distance = np.linalg.norm(points, axis=1)
@@ -128,12 +128,12 @@ def lidar_pixels(
 
 
 def azimuths(columns: int) -> Float[np.ndarray, "column"]:
-    """Of a picture with any number of columns, rad."""
+    """Azimuths of an image with any number of columns, rad."""
     return np.linspace(-np.pi / 2, np.pi / 2, columns)
 
 
 def cartesian(picture: Bool[np.ndarray, "range azimuth"]) -> Float[np.ndarray, "point 2"]:
-    """Points (x forward, y left, m) of a picture with any number of columns, through the grid of the measures."""
+    """Points (x forward, y left, m) of an image with any number of columns, through the grid of the measures."""
     rows, columns = np.nonzero(picture)
     azimuth = azimuths(picture.shape[1])[columns]
     ranges = RANGES[rows]
@@ -141,7 +141,7 @@ def cartesian(picture: Bool[np.ndarray, "range azimuth"]) -> Float[np.ndarray, "
 
 
 def gridded(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "cell 2"]:
-    """Cells of the measures' grid that hold points, as points (m)."""
+    """Cells of the measures' grid that contain points, as points (m)."""
     inside = (points[:, 0] >= 0) & (points[:, 0] <= REACH) & (np.abs(points[:, 1]) <= REACH)
     places = [np.searchsorted(axis, values) for axis, values in zip(GRID, points[inside].T, strict=True)]
     cells = np.unique(np.stack(places, axis=1), axis=0)
@@ -149,5 +149,5 @@ def gridded(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "cell 2"]
 
 
 def on_grid(cells: Sequence[Int[np.ndarray, "cell"]]) -> Float[np.ndarray, "cell 2"]:
-    """Points (m) of the rows and columns of cells of the measures' grid."""
+    """Convert rows and columns of cells of the measures' grid to points (m)."""
     return np.stack([axis[index] for axis, index in zip(GRID, cells, strict=True)], axis=1)

@@ -1,8 +1,8 @@
-"""Receivers that are broken: their place in the array is filled from the neighbours.
+"""Interpolation of broken receivers from their neighbours in the array.
 
-A cell of range and Doppler seldom holds more than one strong echo, whose phase goes on evenly along the receivers. So
-the gap of a dead or saturated one, which beamforming would show as sidelobes in every direction, closes: what the next
-ones to either side say, turned by the step that the others have, averaged. It adds nothing that was not measured.
+A cell of range and Doppler seldom has more than one strong echo, whose phase is linear over the receivers. So
+a dead or saturated receiver, which would cause sidelobes in every direction, is interpolated: its value is the mean of
+the neighbours on either side, each rotated by the phase step of the others. No information is added.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from radarize.radar.config import RadarConfig
 
 
 class Receivers:
-    """Of one radar's array."""
+    """Interpolation for one radar's array."""
 
     def __init__(self, config: RadarConfig):
         grid = np.rint(rx_positions(config)[:, 1:] / (config.wavelength / 2)).astype(int)
@@ -25,7 +25,7 @@ class Receivers:
         spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
         broken: Bool[np.ndarray, "frame rx"],
     ) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """A spectrum without what broken receivers say; zero stands for one with too few neighbours in its row."""
+        """Interpolate the broken receivers of a spectrum; those with too few neighbours in their row become zero."""
         if not broken.any():
             return spectrum
         spectrum = spectrum.clone()
@@ -37,7 +37,7 @@ class Receivers:
     def _fill(
         self, cells: Complex64[torch.Tensor, "range doppler tx rx"], broken: np.ndarray, whole: np.ndarray
     ) -> None:
-        """In place."""
+        """Interpolate broken receivers in place."""
         step = sum(
             (cells[..., b] * cells[..., a].conj()).sum(dim=-1, keepdim=True)
             for a in whole

@@ -1,8 +1,8 @@
-"""Antenna snapshots of strong range-Doppler cells: what each virtual channel reads of an echo, raw.
+"""Antenna snapshots of strong range-Doppler cells: the raw value of each virtual channel.
 
-Nothing is assumed about the array: channels are neither calibrated nor put in an order, and the delays between
-transmitters stay in. Whoever asks which array, which order of transmitters or which phases explain the echoes of a
-moving radar starts from these cells.
+Nothing is assumed about the array: channels are neither calibrated nor sorted, and the delays between
+transmitters remain. Estimates of the array, the order of transmitters or the phases from the echoes of a moving radar
+start from these cells.
 """
 
 from typing import NamedTuple
@@ -13,9 +13,9 @@ from jaxtyping import Bool, Complex64, Float, Int, Int16
 
 from radarize.radar.config import RadarConfig
 
-#: m: nearer cells hold the transmitters' leakage.
+#: m: smallest range, beyond the transmitters' leakage.
 NEAREST = 0.25
-#: A cell counts whose power is so many times the frame's median.
+#: Smallest power of a cell relative to the frame's median.
 _THRESHOLD = 20.0
 _TINY = 1e-20
 
@@ -24,10 +24,10 @@ class Snapshots(NamedTuple):
     """Strong cells of some frames.
 
     Attributes:
-        frame: place of the frame among those given.
-        range: m, without `RadarConfig.range_bias`, between bins.
-        speed: m/s, closing, within the unambiguous span, between bins.
-        power: over the frame's median cell.
+        frame: index of the frame.
+        range: m, without `RadarConfig.range_bias`, interpolated between bins.
+        speed: m/s, closing, within the unambiguous span, interpolated between bins.
+        power: relative to the frame's median cell.
         channels: I/Q at the cell, transmitters and receivers in the order of the samples.
     """
 
@@ -38,7 +38,7 @@ class Snapshots(NamedTuple):
     channels: Complex64[np.ndarray, "cell tx rx"]
 
     def where(self, chosen: np.ndarray) -> "Snapshots":
-        """Some of the cells."""
+        """Select some of the cells."""
         return Snapshots(*(each[chosen] for each in self))
 
 
@@ -48,12 +48,12 @@ def find_snapshots(
     valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     most: int = 48,
 ) -> Snapshots:
-    """Find the strongest local maxima over range and Doppler, `most` a frame.
+    """Find the strongest local maxima over range and Doppler, `most` per frame.
 
     Args:
         samples: raw I/Q.
-        config: of the radar; only its timing and range bins are used.
-        valid: False where a chirp was lost; such a chirp weighs nothing.
+        config: radar configuration; only its timing and range bins are used.
+        valid: False where a chirp was lost; such a chirp has zero weight.
     """
     found = [_of_frame(k, one, config, None if valid is None else valid[k], most) for k, one in enumerate(samples)] or [
         _of_frame(0, np.zeros(config.frame_shape, np.int16), config, None, most)

@@ -1,1 +1,1 @@
-"""Data sets: many recordings from one specification, on local processes or a Ray cluster; `run` is the way in."""
+"""Data sets of many recordings from one specification, made by local processes or on a Ray cluster (`run`)."""

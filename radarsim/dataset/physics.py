@@ -1,18 +1,18 @@
-"""Version of the physics: a digest of the sources that decide a recording's samples and truth."""
+"""Version of the simulated physics: a digest of the sources that determine samples and truth of a recording."""
 
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-#: Parts of the simulator that decide nothing of a recording, and scenes, which have digests of their own.
+#: Parts of the simulator without influence on a recording, and scenes, which have digests of their own.
 _OTHERS = {"__init__.py", "cli.py", "doctor.py", "webpreview.py", "dataset", "emulator", "machine", "scenes", "twin"}
-#: What decides some of it from elsewhere: how a task changes its radar, and what a radar is.
+#: Other sources with influence: the task, which modifies its radar, and the radar model.
 _BESIDES = ("radarsim/dataset/variant.py", "radarize/radar")
 
 
 @cache
 def digest(root: Path = Path(__file__).parents[2]) -> str:
-    """A digest of sources and tables, the same wherever they are installed.
+    """Return a digest of sources and tables that is the same wherever they are installed.
 
     Args:
         root: folder of the packages `radarsim` and `radarize`.

@@ -1,9 +1,9 @@
-"""The plan of a data set: its distributions, and what they gave for each recording."""
+"""Plan of a data set: its distributions and the values drawn for each recording."""
 
 from radarize.io.console import print_table
 from radarsim.dataset.specification import Specification
 
-#: Columns and their fields. Materials have two numbers each, and stand in the index beside the recordings.
+#: Columns and their fields. Materials, which have two numbers each, are in the index beside the recordings.
 _COLUMNS = {
     "clutter": "clutter", "unevenness": "unevenness", "furniture": "furniture", "height, m": "height",
     "pitch, deg": "pitch", "roll, deg": "roll",
@@ -11,7 +11,7 @@ _COLUMNS = {
 
 
 def print_plan(specification: Specification) -> None:
-    """Print the distributions of a data set and a line for each of its recordings; ``-``: not drawn."""
+    """Print the distributions of a data set and one line per recording; ``-``: not drawn."""
     print_table(("field", "platform", "distribution"), specification.randomise.rows())
     rows = []
     for task in specification.tasks:

@@ -34,9 +34,9 @@ LIMITS = {
     "clutter": (0.0, 10.0), "unevenness": (0.0, 10.0), "furniture": (0.0, 2.0), "permittivity": (0.5, 2.0),
     "conductivity": (0.1, 10.0), "height": (0.05, 2.5), "pitch": (-45.0, 45.0), "roll": (-45.0, 45.0),
 }  # fmt: skip
-#: Fields that place the sensor on its platform.
+#: Fields that set the sensor's pose on its platform.
 OF_SENSOR = "height", "pitch", "roll"
-#: What a distribution is given by.
+#: Parameters of each distribution.
 _NUMBERS = {
     "uniform": "[low, high]",
     "normal": "[mean, standard deviation]",
@@ -45,12 +45,12 @@ _NUMBERS = {
 }
 _KINDS = "; ".join(f"{kind}: {numbers}" for kind, numbers in _NUMBERS.items())
 _EXPECTED = f"expected a number or one of: {_KINDS}; or such for some of {', '.join(PLATFORMS)}"
-#: Largest standard deviations.
+#: Largest standard deviations allowed.
 _WIDEST = {"normal": 100.0, "lognormal": 3.0}
-#: Standard deviations at which normal distributions end, and what lies below.
+#: Standard deviations at which normal distributions are truncated, and the probability below.
 _END = 3.0
 _BELOW = [float(share) for share in ndtr([-_END, _END])]
-#: Materials that are scaled: people's skin is none of a room's.
+#: Materials whose permittivity is drawn; people's skin is not among a room's materials.
 _SCALED = [name for name in DIELECTRICS if name != "skin"]
 
 
@@ -68,10 +68,10 @@ class Distribution:
 
     @classmethod
     def of(cls, given: object) -> "Distribution":
-        """From what a YAML file gives.
+        """Read a distribution from its YAML value.
 
         Raises:
-            ValueError: it is no distribution.
+            ValueError: the value is no distribution.
         """
         if _is_number(given):
             return cls("constant", (float(given),))  # type: ignore[arg-type]
@@ -96,11 +96,11 @@ class Distribution:
 
     @property
     def given(self) -> float | dict[str, list[float]]:
-        """As in a YAML file."""
+        """YAML value of the distribution."""
         return self.numbers[0] if self.kind == "constant" else {self.kind: [*self.numbers]}
 
     def quantile(self, share: float) -> float:
-        """The number below which so large a share (0...1) of the draws lies."""
+        """Quantile of a probability 0...1."""
         if self.kind in ("constant", "choice"):
             return sorted(self.numbers)[min(int(share * len(self.numbers)), len(self.numbers) - 1)]
         first, last = self.numbers
@@ -133,7 +133,7 @@ Drawn = Distribution | dict[Platform, Distribution] | None
 
 
 class Randomise(Frozen):
-    """Distributions by field; None: not drawn.
+    """Distributions by field; None: the field is not drawn.
 
     Attributes:
         clutter, unevenness: value in place of that of the scene file.
@@ -156,7 +156,7 @@ class Randomise(Frozen):
     @classmethod
     @cache
     def usual(cls) -> "Randomise":
-        """The range of real rooms."""
+        """Default distributions, the range of real rooms."""
         return cls.model_validate(read_beside(__file__))
 
     @field_validator("*", mode="before")
@@ -180,12 +180,12 @@ class Randomise(Frozen):
         return {key: each.given for key, each in about.items()} if isinstance(about, dict) else about and about.given
 
     def of(self, field: str, platform: str) -> Distribution | None:
-        """The distribution of a field for a platform."""
+        """Return the distribution of a field for a platform, or None."""
         about = getattr(self, field)
         return about.get(platform) if isinstance(about, dict) else about
 
     def draw(self, seed: int, platform: str, fixed: Collection[str] = ()) -> dict[str, Any]:
-        """Values of one recording, JSON-ready, to four digits.
+        """Draw the values of one recording, JSON-ready, rounded to four digits.
 
         Args:
             seed: of the recording.
@@ -193,8 +193,8 @@ class Randomise(Frozen):
             fixed: fields that are not drawn, and ``materials``.
 
         Returns:
-            Fields of a scene file (clutter, unevenness, furniture, materials), and height, pitch and roll: all three
-            where one of them is drawn, the others as the platform has them.
+            Fields of a scene file (clutter, unevenness, furniture, materials), and height, pitch and roll: all three if
+                one of them is drawn, the others with the platform's values.
         """
 
         def drawn(field: str, about: Distribution, count: int = 1) -> list[float]:
@@ -221,7 +221,7 @@ class Randomise(Frozen):
         return found
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
-        """Field, platform (``all``) and distribution of all that is drawn."""
+        """Field, platform (``all``) and distribution of every field that is drawn."""
         for field in LIMITS:
             about = getattr(self, field)
             for platform, each in (about if isinstance(about, dict) else {"all": about}).items():
@@ -230,7 +230,7 @@ class Randomise(Frozen):
 
 
 def mounting(drawn: Mapping[str, Any], platform: str) -> Mounting | None:
-    """How a sensor with drawn height, pitch and roll sits on its platform; None: as the platform has it."""
+    """Return the mounting of a sensor with drawn height, pitch and roll; None: the platform's own."""
     if not drawn.keys() >= set(OF_SENSOR):
         return None
     carrier = PLATFORMS[platform]
@@ -243,7 +243,7 @@ def _is_number(given: object) -> bool:
 
 
 def _within(about: Distribution, field: str) -> Distribution:
-    """A distribution whose values a field may have. Raises ValueError of another."""
+    """Check that all values of a distribution are allowed for its field; ValueError otherwise."""
     low, high = LIMITS[field]
     for value in (about.quantile(0.0), about.quantile(1.0)):
         if not low <= value <= high:

@@ -1,4 +1,4 @@
-"""Make a data set: look what is there, hand out the rest, report, and go on where an earlier run ended."""
+"""Make a data set: keep finished recordings, distribute the remaining tasks, and resume interrupted runs."""
 
 import json
 import os
@@ -17,18 +17,18 @@ from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Stale, Task
 from radarsim.machine.threads import default_workers
 
-#: The expanded specification beside the recordings: parameters of each, and the members of every split.
+#: File beside the recordings with the expanded specification: parameters of each, and members of every split.
 INDEX = "dataset.json"
 
 
 @dataclass
 class Outcome:
-    """What a run made.
+    """Result of a run.
 
     Attributes:
         made: finished in this run.
         kept: were finished before.
-        failed: name to the reason.
+        failed: name to error message.
     """
 
     made: list[str] = field(default_factory=list)
@@ -44,26 +44,26 @@ def make(
     ray: str | None = None,
     replace: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    say: Callable[[str], None] = print,
+    log: Callable[[str], None] = print,
 ) -> Outcome:
-    """Make every recording of a data set that is not there yet.
+    """Make the recordings of a data set that do not exist yet.
 
-    A recording that is there is opened and compared with its task: whole and of the same parameters, it is kept; one
-    that was begun goes on with its next frame. So a run that was stopped, or killed, goes on by being started again,
-    and ends in the same bytes.
+    An existing recording is compared with its task: it is kept if it is whole and has the same parameters; an
+    unfinished one is continued at its next frame. An interrupted run is resumed by starting it again, and gives the
+    same bytes.
 
     Args:
-        specification: what to make.
-        folder: where; every worker must see it under this name.
+        specification: data set to make.
+        folder: output folder; every worker must have it under this path.
         workers: local processes; default: one per core, as far as memory goes.
         ray: address of a Ray cluster (``auto``: the one of this machine) to use instead.
-        replace: make recordings of other parameters anew, instead of refusing.
-        progress: called with (frames done, frames in all), recordings found included.
-        say: takes a line for every finished recording.
+        replace: replace recordings that have other parameters; default: an error.
+        progress: called with (frames done, total frames), existing recordings included.
+        log: takes a line for every finished recording.
 
     Raises:
-        InputError: recordings of other parameters are in the folder, another run is at work there, the disk is full, or
-            the user interrupted; what is finished stays.
+        InputError: the folder has recordings of other parameters, another run works there, the disk is full, or the
+            user interrupted; finished recordings stay.
     """
     folder = Path(folder).resolve()
     tasks = specification.tasks
@@ -84,11 +84,11 @@ def make(
                     todo[name].clear(folder)
                     if news.full:
                         raise DiskFull(f"{FULL}; {_finished(outcome, tasks, folder)}")
-                    say(f"failed: {news.error}")
+                    log(f"failed: {news.error}")
                 elif news.ended:
                     outcome.made.append(name)
                     done[name] = todo[name].frames
-                    say(f"{name}: {news.result}")
+                    log(f"{name}: {news.result}")
                 else:
                     done[name] = int(news.done)
                 progress(sum(done.values()), total)
@@ -98,7 +98,7 @@ def make(
 
 
 def making(tasks: Iterable[Task], folder: Path) -> dict[str, Job]:
-    """Jobs that make recordings, report frames, and end with statistics of the motion, one line."""
+    """Jobs that make recordings, report their frames, and return the statistics of the motion in one line."""
     return {task.name: partial(_make, task, folder) for task in tasks}
 
 
@@ -108,7 +108,7 @@ def _make(task: Task, folder: Path, report: Report) -> str:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Hold a folder for one run; the lock goes with the process, however that ends."""
+    """Lock a folder for one run; the lock is released when the process ends."""
     with explained(f"{folder}: cannot be written", OSError):
         folder.mkdir(parents=True, exist_ok=True)
     handle = hold(folder)
@@ -119,10 +119,10 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def _examine(tasks: tuple[Task, ...], folder: Path, replace: bool) -> list[Task]:
-    """Tasks whose recordings are there.
+    """Return the tasks whose recordings exist.
 
     Raises:
-        InputError: some are of other parameters, and `replace` is not set.
+        InputError: some have other parameters, and `replace` is not set.
     """
     finished, stale = [], []
     for task in tasks:
@@ -134,7 +134,7 @@ def _examine(tasks: tuple[Task, ...], folder: Path, replace: bool) -> list[Task]
     if stale and not replace:
         others = f" (and {len(stale) - 1} more)" if len(stale) > 1 else ""
         raise InputError(
-            f"{folder}: {stale[0]}{others}; --replace makes such recordings anew, another folder leaves them alone"
+            f"{folder}: {stale[0]}{others}; --replace makes such recordings again, another folder keeps them"
         )
     return finished
 
@@ -146,4 +146,4 @@ def _write_index(specification: Specification, folder: Path) -> None:
 
 def _finished(outcome: Outcome, tasks: tuple[Task, ...], folder: Path) -> str:
     count = len(outcome.made) + len(outcome.kept)
-    return f"{count} of {len(tasks)} recordings are finished in {folder}; the same command goes on from there"
+    return f"{count} of {len(tasks)} recordings are finished in {folder}; the same command continues"

@@ -63,7 +63,7 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
 
 class Recordings(Frozen):
-    """Some recordings of one building.
+    """A group of recordings in one building.
 
     Attributes:
         building: name in `buildings`, or a pattern of several names (* and ?).
@@ -94,7 +94,7 @@ class Recordings(Frozen):
         return (self.platform,) if isinstance(self.platform, str) else self.platform
 
     def each(self, count: Counter) -> Iterator[tuple[str, str, int | None]]:
-        """Name, platform and floor of each recording; `count` says how many there are by place and platform."""
+        """Name, platform and floor of each recording; `count` counts the recordings by place and platform."""
         for platform in self.platforms:
             for k in range(self.count):
                 floor = self.floors[k % len(self.floors)] if self.floors else None
@@ -138,7 +138,7 @@ class Specification(Frozen):
     @field_validator("buildings", mode="before")
     @classmethod
     def _each_seed(cls, given: object) -> object:
-        """Buildings with `seeds`, first and last, as so many buildings."""
+        """Expand a building with `seeds`, first and last, to one building per seed."""
         if not isinstance(given, dict):
             return given
         found: dict[str, object] = {}
@@ -157,7 +157,7 @@ class Specification(Frozen):
 
     @model_validator(mode="after")
     def _each_building(self) -> "Specification":
-        """Recordings of a pattern as those of each building that matches."""
+        """Expand recordings with a pattern to those of each matching building."""
         groups: list[Recordings] = []
         for group in self.recordings:
             names = (
@@ -192,7 +192,7 @@ class Specification(Frozen):
 
     @classmethod
     def load(cls, path: str | Path) -> "Specification":
-        """Read a specification: a YAML file, or the name of one that comes with the project (``small``).
+        """Read a specification: a YAML file, or the name of one of the project (``small``).
 
         Raises:
             InputError: missing file, malformed YAML, an unknown key or a wrong value, with file and field.
@@ -204,7 +204,7 @@ class Specification(Frozen):
         try:
             found = cls.model_validate(data)
             found._folder = path.parent
-            for late in ("tasks", "members"):  # so that their errors come now, with the file's name
+            for late in ("tasks", "members"):  # compute them now, so that their errors name the file
                 getattr(found, late)
         except ValidationError as error:
             raise InputError(f"{path}: {format_validation_error(error, data)}") from error
@@ -263,7 +263,7 @@ class Specification(Frozen):
 
     @cached_property
     def members(self) -> dict[str, dict[str, list[str]]]:
-        """Split name to train, validation and test to names of recordings."""
+        """Names of the training, validation and test recordings of each split."""
         found: dict[str, dict[str, list[str]]] = {}
         for name, split in self.splits.items():
             rng = np.random.default_rng([self.seed, *name.encode()])
@@ -282,7 +282,7 @@ class Specification(Frozen):
         }
 
     def _settings(self, key: str, variant: Variant, radar: str, frontend: str | None) -> tuple[RadarConfig, str]:
-        """A variant's radar, and a digest of it and the front end."""
+        """Radar configuration of a variant, and a digest of it and its front end."""
         try:
             config, _ = load_config(variant.radar_of(radar))
             check_limits(config)
@@ -299,7 +299,7 @@ class Specification(Frozen):
         return tuple(chosen(["all"] if self.sensors == "all" else self.sensors))
 
     def _scene(self, building: str, floor: int | None, level: int) -> tuple[dict | str, set[str]]:
-        """A scene, and what is not drawn for recordings in it."""
+        """Scene of a recording, and the fields that are not drawn in it."""
         given = self.buildings[building]
         if isinstance(given, str):
             try:
@@ -323,7 +323,7 @@ class Specification(Frozen):
         return description, set(given)
 
     def _beside(self, name: str) -> str:
-        """A file that the specification names: beside it where there is one, else left to those who look further."""
+        """Path of a file that the specification names: beside it if it exists there, else as it is."""
         beside = self._folder / name
         found = next((path for path in (beside, Path(name)) if path.is_file()), None)
         return name if found is None else str(within(found, "it", self._folder, Path("scenes"), shipped()).resolve())

@@ -1,4 +1,4 @@
-"""Which recordings train, validate and test: at random, by platform, or with a building held out (paper, section 7)."""
+"""Splits into training, validation and test recordings: random, by platform, or by building (paper, section 7)."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -38,7 +38,7 @@ class RandomSplit(Frozen):
         return self
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
-        """Split name to its parts."""
+        """Parts of each split by its name."""
         ends = np.round(np.cumsum([self.train, self.validation]) * len(tasks)).astype(int)
         found = {}
         for fold in range(self.folds):
@@ -66,10 +66,10 @@ class PlatformSplit(Frozen):
     validation: Share = 0.1
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
-        """Split name to its parts.
+        """Parts of each split by its name.
 
         Raises:
-            InputError: a platform that no recording has, or one on both sides.
+            InputError: a platform without recordings, or one in both parts.
         """
         present = sorted({task.platform for task in tasks})
         tested = tuple(p for p in present if p not in self.train) if self.test is None else self.test
@@ -95,10 +95,10 @@ class BuildingSplit(Frozen):
     validation: Share = 0.1
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
-        """Split name to its parts.
+        """Parts of each split by its name.
 
         Raises:
-            InputError: a building that no recording has, or none that is left to train on.
+            InputError: a building without recordings, or no building left to train on.
         """
         present = sorted({task.building for task in tasks})
         _require_known("held_out", self.held_out or (), present)

@@ -1,4 +1,4 @@
-"""One recording of a data set: what it must be, whether it is there already, and how it is made."""
+"""Task to make one recording of a data set: parameters, whether it is finished, and its simulation."""
 
 import json
 from collections.abc import Callable
@@ -19,14 +19,14 @@ from radarsim.dataset.randomise import OF_SENSOR, mounting
 from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import meshes, split_level
 
-#: Attribute of a recording that holds its task's parameters.
+#: Attribute of a recording with its task's parameters.
 ATTRIBUTE = "task"
-#: What lies beside a recording until it is whole: samples of it, or those that its heat maps are made from.
+#: Suffixes of temporary files beside an unfinished recording: its samples, or those of its heat maps.
 _LEFTOVERS = (".part", ".begun", ".raw.part", ".raw.part.part", ".raw.part.begun")
 
 
 class Stale(InputError):
-    """A recording that was made with other parameters."""
+    """The recording has other parameters than its task."""
 
 
 @dataclass(frozen=True)
@@ -34,24 +34,24 @@ class Task:
     """One recording to make.
 
     Attributes:
-        name: of the recording, without suffix.
+        name: name of the recording, without suffix.
         building, floor: as in the specification.
         platform: how the sensor moves.
-        scene: a scene's description, or the path of its file (with a level, ``corner.yaml@2``).
-        duration: s.
-        frames: that the recording will have.
+        scene: scene description, or the path of its file (with a level, ``corner.yaml@2``).
+        duration: duration, s.
+        frames: number of frames of the recording.
         seed: of tour, scatterers and noise.
-        radar: preset or configuration file.
+        radar: radar preset or configuration file.
         frontend: front-end file; None for the default.
-        settings: digest of what these two hold.
+        settings: digest of the contents of radar and front-end files.
         sensors: truth sensors.
         storage: ``raw`` or ``heatmaps``.
-        waypoints: to go through instead of a tour, m.
-        content: of the scene's file, see `content`; None: it has none.
-        variant: what differs from other recordings of the same walk.
-        attributes: of the recording.
-        people: pedestrians near the radar's path.
-        randomised: what was drawn for it, see `Randomise.draw`.
+        waypoints: way-points instead of a tour, m.
+        content: digests of the scene's files, see `content`; None: the scene has no file.
+        variant: changes against other recordings of the same walk.
+        attributes: attributes of the recording.
+        people: number of pedestrians near the radar's path.
+        randomised: values drawn for it, see `Randomise.draw`.
     """
 
     name: str
@@ -76,14 +76,14 @@ class Task:
 
     @property
     def parameters(self) -> dict[str, object]:
-        """Everything that decides the recording's bytes; files by their content, so that they may move.
+        """All parameters that determine the recording's bytes; files by their content, so that they may move.
 
-        The version is there beside the sources of the physics for what else makes a recording: heat maps, compression.
+        The version is included beside the sources of the physics, because it determines heat maps and compression.
         """
         found = asdict(self) | {"sensors": list(self.sensors), "version": __version__, "physics": physics.digest()}
         for file in ("radar", "frontend"):
             found[file] = found[file] and Path(found[file]).name
-        found["attributes"] = self.attributes or None  # older recordings know no such fields
+        found["attributes"] = self.attributes or None  # absent in recordings of older versions
         found["people"] = self.people or None
         found["randomised"] = self.randomised or None
         found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
@@ -92,28 +92,29 @@ class Task:
 
     @property
     def identity(self) -> str:
-        """`parameters` as the text that the recording keeps."""
+        """`parameters` as JSON text, as stored in the recording."""
         return json.dumps(self.parameters, sort_keys=True)
 
     def path(self, folder: Path) -> Path:
-        """Where the recording lies."""
+        """Path of the recording."""
         return folder / f"{self.name}.h5"
 
     def is_finished(self, folder: Path) -> bool:
-        """Whether the recording is there, whole, and with all its sensors.
+        """Whether the recording exists, is whole, and has all its sensors.
 
         Raises:
-            Stale: it is, but was made with other parameters, or is no recording of a data set.
+            Stale: it exists but has other parameters, or is not part of a data set.
         """
         return self._lacking(folder) == []
 
     def _lacking(self, folder: Path) -> list[str] | None:
-        """Sensors that the recording has yet to get; None where there is no whole one. Raises as `is_finished`."""
+        """Sensors still missing in the recording; None if it does not exist or is not whole. Raises as
+        `is_finished`."""
         try:
             with Recording(self.path(folder)) as recording:
                 frames, text = len(recording), recording.attributes.get(ATTRIBUTE)
         except InputError:
-            return None  # not there, cut short or damaged
+            return None  # missing, truncated or damaged
         if text is None:
             raise Stale(f"{self.name} does not come from a data set")
         made, wanted = json.loads(str(text)), json.loads(self.identity)
@@ -126,23 +127,22 @@ class Task:
         return lacking if frames == self.frames else None
 
     def make(self, folder: Path, progress: Callable[[int, int], None] | None = None) -> str:
-        """Simulate the recording, or what it lacks of sensors beside the radar; it appears under its name when it is
-        whole.
+        """Simulate the recording, or only the sensors that it lacks. The file gets its name when it is whole.
 
         Args:
-            folder: where.
-            progress: called with (frames done, frames in all).
+            folder: folder of the data set.
+            progress: called with (frames done, total frames).
 
         Returns:
-            statistics of its motion, one line.
+            Statistics of the motion in one line.
 
         Raises:
-            InputError: with the task's name.
+            InputError: with the task's name in the message.
         """
         from radarize.learning.features.keeping import keep_maps
         from radarsim.machine.threads import share_with_drjit
         from radarsim.motion.statistics import Statistics
-        from radarsim.recording.add_sensors import accompany
+        from radarsim.recording.add_sensors import add_sensors
         from radarsim.recording.batches import Batches
         from radarsim.recording.simulate import record
 
@@ -154,13 +154,13 @@ class Task:
         try:
             scenario, cfg_text = self._scenario()
             if late:
-                accompany(final, scenario, late, about, progress)
+                add_sensors(final, scenario, late, about, progress)
             else:
                 path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
                 batches = Batches.of(scenario)
                 if (frames := len(batches.times)) < self.frames:
                     raise InputError(
-                        f"the way-points are passed after {frames} of {self.frames} frames, expected more way"
+                        f"the way-points are reached after {frames} of {self.frames} frames, expected a longer path"
                     )
                 record(batches, path, cfg_text=cfg_text, attributes=about, progress=progress)
                 if path != final:
@@ -173,7 +173,7 @@ class Task:
         return str(moved)
 
     def _scenario(self):
-        """The `Scenario` to record, and the radar's original configuration text."""
+        """The `Scenario` to record, and the original configuration text of the radar."""
         from radarsim.recording.simulate import planned
         from radarsim.world.scene import Scene
 
@@ -194,7 +194,7 @@ class Task:
         return scenario, cfg_text
 
     def clear(self, folder: Path) -> None:
-        """Remove what is left of making the recording, by this run or by one that was killed."""
+        """Remove temporary files of this recording, left by this run or an interrupted one."""
         path = self.path(folder)
         for suffix in _LEFTOVERS:
             path.with_name(path.name + suffix).unlink(missing_ok=True)
@@ -205,10 +205,10 @@ class Task:
 
 
 def content(scene: dict | str) -> dict[str, object] | None:
-    """Name and digest of a scene's file, and digests of its meshes by name; None of a scene without a file.
+    """Name and digest of a scene's file, and digests of its meshes by name; None: the scene has no file.
 
     Raises:
-        InputError: one of them cannot be read.
+        InputError: a file cannot be read.
     """
     if isinstance(scene, dict):
         return None

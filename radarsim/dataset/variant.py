@@ -1,4 +1,4 @@
-"""What differs between recordings that have everything else in common: scatterers, noise and the walk included."""
+"""Variants of a recording: changes of radar, front end or scene level with the same walk, scatterers and noise."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -45,10 +45,10 @@ class Variant(Frozen):
         return fields
 
     def with_board(self, beside: Callable[[str], str]) -> "Variant":
-        """The same, with what a board's file holds in place of its name, which `beside` turns into a path.
+        """Return the variant with the name of a board replaced by the contents of its file, whose path `beside` gives.
 
         Raises:
-            InputError: there is no such file, or it cannot be used.
+            InputError: the file does not exist or cannot be used.
         """
         radar = self.radar if isinstance(self.radar, dict) else {}
         board = radar.get("board")
@@ -57,17 +57,17 @@ class Variant(Frozen):
         return self.model_copy(update={"radar": {**radar, "board": load_board(beside(board))}})
 
     def radar_of(self, name: str) -> str | RadarConfig:
-        """The radar of that name (preset or file) with the changes; the name itself where there are none.
+        """Return the radar of that name (preset or file) with the changes; the name itself if there are none.
 
         Raises:
-            InputError: no such preset or file, or an impossible value.
+            InputError: unknown preset, missing file, or impossible value.
         """
         if isinstance(self.radar, str):
             return self.radar
         return load_config(name)[0].changed("radar", **self.radar) if self.radar else name
 
     def frontend_of(self, file: str | None, board: str | Board) -> FrontEndConfig:
-        """The front end of that file, by default the board's, with the changes.
+        """Return the front end of a file, or the board's, with the changes.
 
         Raises:
             InputError: unreadable file, or an unknown or impossible value.
@@ -77,5 +77,5 @@ class Variant(Frozen):
 
     @property
     def mounted(self) -> Mounting | None:
-        """The sensor's mounting; None: the platform's own."""
+        """Mounting of the sensor; None: the platform's own."""
         return Mounting.of(self.mounting[:3], self.mounting[3:]) if self.mounting else None

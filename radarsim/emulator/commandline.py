@@ -1,7 +1,7 @@
-"""The command line of TI's `mmwDemo` firmware: which commands it knows, when it refuses them, and its words.
+"""Command line of TI's `mmwDemo` firmware: its commands, their preconditions, and its messages.
 
-Behaviour and messages: mmWave SDK 3.6, `packages/ti/utils/cli` and `packages/ti/demo/xwr18xx/mmw`; what sensorStart
-finds wrong with the chirps is said in this project's words, where the firmware has numbers only.
+Behaviour and messages follow mmWave SDK 3.6, `packages/ti/utils/cli` and `packages/ti/demo/xwr18xx/mmw`. Where
+sensorStart rejects the chirps, the firmware prints error numbers only; the messages here are this project's.
 """
 
 from collections.abc import Callable
@@ -19,8 +19,8 @@ BANNER = (
     "xWR18xx MMW Demo 03.06.00.00 (emulated)\n"
     "******************************************\n"
 )
-#: How many values each configuration command takes. RF commands, which flushCfg forgets, and the demo's own, all of
-#: which every sensorStart without argument wants anew.
+#: Number of values of each configuration command. RF commands, which flushCfg clears, and the demo's own, which
+#: every sensorStart without argument requires again.
 RF = {name: len(FIELDS[name]) for name in ("dfeDataOutputMode", "channelCfg", "adcCfg", "profileCfg", "chirpCfg")}
 RF |= {"frameCfg": len(FIELDS["frameCfg"]), "lowPower": 2, "advFrameCfg": 5, "subFrameCfg": 10, "contModeCfg": 9}
 DEMO = {
@@ -31,7 +31,7 @@ DEMO = {
 }  # fmt: skip
 OPTIONAL = {"bpmCfg": 4, "configDataPort": 2}
 _COUNTS = RF | DEMO | OPTIONAL
-#: Read once, at the first sensorStart; other values need a reboot.
+#: Read only at the first sensorStart; other values need a reboot.
 _OPENING = ("channelCfg", "adcCfg", "lowPower")
 _MOST_FRAMES = 65535
 _FRAMES = ("profileCfg", "chirpCfg", "frameCfg")
@@ -55,28 +55,28 @@ _PARTIAL = (
 
 
 class Radar(Protocol):
-    """What the commands act on."""
+    """Radar that the commands control."""
 
     def start(self, config: RadarConfig, frames: int) -> None:
-        """Send `frames` frames, or, if 0, frames without end; InputError refuses the configuration."""
+        """Send a number of frames, or endlessly if `frames` is 0; raise InputError for an unusable configuration."""
 
     def stop(self) -> None:
-        """Returns when the frame in progress has ended."""
+        """Stop and return when the frame in progress has ended."""
 
 
 class CommandLine:
-    """The firmware's answers to lines, as after power-up."""
+    """Firmware command line in its state after power-up."""
 
     def __init__(self, radar: Radar):
         self._radar = radar
         self._lines: list[tuple[str, ...]] = []
-        self._pending: set[str] = set()  # the demo's commands since power-up or the last sensorStop
+        self._pending: set[str] = set()  # demo commands since power-up or the last sensorStop
         self._opened: list[tuple[str, ...]] | None = None
         self._last: tuple[RadarConfig, int] | None = None
         self._started = False
 
     def execute(self, line: str) -> str:
-        """What the firmware writes after `line`, without the echo before and the prompt behind it."""
+        """Return the firmware's answer to a line, without echo and prompt."""
         if line.startswith("%"):
             return "Skipped\n"
         words = line.split()
@@ -144,7 +144,7 @@ class CommandLine:
         return debug
 
     def _check_opening(self) -> None:
-        """Real firmware stops dead here, in an assertion."""
+        """Check the settings that need a reboot; real firmware stops in an assertion if they change."""
         opening = sorted({line[0]: line for line in self._lines if line[0] in _OPENING}.values())
         if self._opened is None:
             self._opened = opening
@@ -152,7 +152,7 @@ class CommandLine:
             raise InputError(f"{', '.join(_OPENING)} differ from the first sensorStart's, expected a reboot in between")
 
     def _read(self) -> tuple[RadarConfig, int]:
-        """The configuration, and how many frames to send."""
+        """Return the configuration and the number of frames to send."""
         config = parse_cfg("\n".join(" ".join(line) for line in self._lines), "commands so far")
         check_limits(config, demo=True)
         last = {line[0]: line[1:] for line in self._lines}

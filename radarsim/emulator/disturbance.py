@@ -1,4 +1,4 @@
-"""What a network does to packets: loss, duplicates, reordering, delay; by rate and seed."""
+"""Network faults of the emulated link: packet loss, duplication, reordering and delay, by rate and seed."""
 
 import heapq
 from collections.abc import Iterator
@@ -8,19 +8,19 @@ import numpy as np
 
 from radarize.io.errors import InputError
 
-#: How many packets overtake one that is reordered, or delayed, from and to. Delayed ones are still within the 1 MiB in
-#: which `FrameAssembler` takes late packets.
+#: Smallest and largest number of packets that overtake a reordered or a delayed one. Delayed packets stay within the
+#: 1 MiB in which `FrameAssembler` accepts late packets.
 REORDERED, DELAYED = (1, 8), (100, 400)
 
 
 @dataclass
 class Disturbance:
-    """Loses, repeats and holds back packets. The same seed treats the same packets alike.
+    """Lose, duplicate, reorder and delay packets; the same seed affects the same packets.
 
     Attributes:
-        loss, duplicate, reorder, delay: share of the packets that this happens to, each on its own.
-        rng: draws which.
-        lost, duplicated, reordered, delayed: packets so far.
+        loss, duplicate, reorder, delay: fraction of packets affected, each independently.
+        rng: random generator.
+        lost, duplicated, reordered, delayed: number of packets so far.
 
     Raises:
         InputError: a share outside 0...1.
@@ -41,10 +41,10 @@ class Disturbance:
             if not 0 <= getattr(self, name) <= 1:
                 raise InputError(f"{name} is {getattr(self, name)}, expected a share of the packets from 0 to 1")
         self._passed = 0
-        self._held: list[tuple[int, int, bytes]] = []  # when it goes, how many have passed; ties in order
+        self._held: list[tuple[int, int, bytes]] = []  # packet count at which it is sent, its own number, packet
 
     def __call__(self, packet: bytes) -> Iterator[bytes]:
-        """The packets that go out when `packet` is to."""
+        """Yield the packets to send when `packet` is due."""
         lost, twice, overtaken, late = self.rng.random(4) < (self.loss, self.duplicate, self.reorder, self.delay)
         self._passed += 1
         if lost:
@@ -67,6 +67,6 @@ class Disturbance:
         return f"{self.lost} lost, {self.duplicated} twice, {self.reordered} out of order, {self.delayed} delayed"
 
     def rest(self) -> Iterator[bytes]:
-        """Those still held back: no more packets will push them out."""
+        """Yield the packets still held back at the end."""
         while self._held:
             yield heapq.heappop(self._held)[2]

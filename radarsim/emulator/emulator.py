@@ -1,7 +1,7 @@
-"""A virtual IWR1843BOOST with a DCA1000: serial port, board and the radar's clock tied together.
+"""Virtual IWR1843BOOST with a DCA1000: serial port, capture board and the radar's frame clock.
 
-The UART starts the radar; the radar sends each chirp's samples over LVDS when the chirp ends; the board, if it records,
-makes packets of them.
+Commands on the UART start the radar; the radar sends each chirp's samples over LVDS at the end of the chirp; the
+board, while recording, sends them as packets.
 """
 
 import threading
@@ -19,31 +19,31 @@ from radarsim.emulator.link import Link
 from radarsim.emulator.source import NOT_IN_SAMPLES, Source
 from radarsim.emulator.uart import Uart
 
-#: A busy machine holds the radar up now and then: up to this (s) it catches up. Further behind, or behind a source that
-#: is too slow, its clock is set back and frames come late.
+#: Lag (s) that the radar catches up with after a delay by the machine. If it lags further, or if the source is too
+#: slow, its clock is set back and frames are late.
 _CATCH_UP = 0.25
 _ON_TIME = 5e-3  # s
-_WAKE_UP = 1e-3  # s: the chirps of so long a time are sent together, since waking up for each would cost too much
+_WAKE_UP = 1e-3  # s: chirps within this time are sent together, because waking up for each would cost too much
 _IDLE = 0.01  # s
-_PREPARATION = 120.0  # s, longest wait of sensorStart for the first frame
+_PREPARATION = 120.0  # s, longest time that sensorStart waits for the first frame
 
 
 class Emulator:
-    """A virtual radar and capture board; use as a context manager.
+    """Virtual radar and capture board; a context manager.
 
     Args:
-        source: of the samples.
-        addresses: of the board and of the machine that records.
-        port_link: symbolic link to the serial port.
-        disturbance: of the packets on their way.
-        ahead: s, how much of the source is made ahead of time.
-        say: shows the user a line.
+        source: source of the samples.
+        addresses: of the board and the capture computer.
+        port_link: symbolic link to the serial port to create.
+        disturbance: network faults of the packets.
+        ahead: time simulated ahead of transmission, s.
+        log: takes a line for the user, such as "radar: stopped".
 
     Attributes:
-        port: the serial port's path.
-        frames: sent so far.
-        late: how often the radar's clock was set back because the source or this machine was too slow.
-        lateness: s, by how much in all.
+        port: path of the serial port.
+        frames: number of frames sent.
+        late: number of times that the radar's clock was set back because the source or this machine was too slow.
+        lateness: total delay by this, s.
 
     Raises:
         InputError: source, address or link cannot be used.
@@ -57,9 +57,9 @@ class Emulator:
         port_link: Path | None = None,
         disturbance: Disturbance | None = None,
         ahead: float = 10.0,
-        say: Callable[[str], None] = print,
+        log: Callable[[str], None] = print,
     ):
-        self.source, self._ahead, self._say = source, ahead, say
+        self.source, self._ahead, self._log = source, ahead, log
         self.frames = self.late = 0
         self.lateness = 0.0
         self._running = threading.Event()  # from sensorStart to the end of the last frame
@@ -67,7 +67,7 @@ class Emulator:
         self._left = self._resets = 0
         self._lock = threading.Lock()  # resets and starts come from different threads
         expected = source.expected()
-        self._sockets = BoardSockets(addresses, say)
+        self._sockets = BoardSockets(addresses, log)
         self.link = Link(self._sockets.data, self._sockets.report, disturbance)
         try:
             self._uart = Uart(lambda: CommandLine(self).execute, port_link)
@@ -76,7 +76,7 @@ class Emulator:
             raise
         self.port = self._uart.path
         self._feed = self._feeding(expected)
-        self._sockets.serve(Board(self.link, self._reset, say).execute)
+        self._sockets.serve(Board(self.link, self._reset, log).execute)
         self._thread = threading.Thread(target=self._live, name="radar", daemon=True)
         self._thread.start()
 
@@ -93,10 +93,10 @@ class Emulator:
 
     @property
     def ready(self) -> int:
-        """Frames made ahead.
+        """Number of frames made ahead.
 
         Raises:
-            InputError: the source has failed.
+            InputError: the source failed.
         """
         if self._feed.failure:
             raise self._feed.failure
@@ -104,17 +104,17 @@ class Emulator:
 
     # --- what the command line acts on --------------------------------------------------------------------------------
     def start(self, config: RadarConfig, frames: int) -> None:
-        """Begin to send, the first frame included: `frames` frames, or without end if 0.
+        """Start to send frames, and return once the first one is ready.
 
         Raises:
-            InputError: the source cannot give this configuration, or the radar is reset meanwhile.
+            InputError: the source has no such configuration, or the radar was reset meanwhile.
         """
         resets = self._resets
         try:
             self.source.check(config)
             self._prepare(config)
         except InputError as error:
-            self._say(f"radar: sensorStart refused: {error}")
+            self._log(f"radar: sensorStart refused: {error}")
             raise
         with self._lock:
             if self._resets != resets:
@@ -122,14 +122,14 @@ class Emulator:
             self._left = frames or -1
             self._stopping.clear()
             self._running.set()
-        self._say(f"radar: started, {config.frame_rate:.2f} frames/s of {config.frame_bytes} bytes")
+        self._log(f"radar: started, {config.frame_rate:.2f} frames/s of {config.frame_bytes} bytes")
 
     def stop(self) -> None:
         """Stop at the end of the frame in progress, and return then."""
         self._stopping.set()
         while self._running.is_set() and not self._closed.is_set():
             time.sleep(1e-3)
-        self._say(f"radar: stopped; {self}")
+        self._log(f"radar: stopped; {self}")
 
     def __str__(self) -> str:
         late = f", {self.late} of them late, {self.lateness:.2f} s in all" if self.late else ""
@@ -146,7 +146,7 @@ class Emulator:
         return Feed(self.source, config, round(self._ahead * config.frame_rate))
 
     def _prepare(self, config: RadarConfig) -> None:
-        """Have the source's first frames at hand."""
+        """Wait for the source's first frames."""
         made, asked = (c.model_dump(exclude=NOT_IN_SAMPLES) for c in (self._feed.config, config))
         if self._touched or made != asked:
             self._feed.close()
@@ -163,7 +163,7 @@ class Emulator:
                 try:
                     self._send(self._feed)
                 except InputError as error:
-                    self._say(f"radar: {error}")
+                    self._log(f"radar: {error}")
                 finally:
                     self._running.clear()
             self.link.advance(time.monotonic() + _IDLE)
@@ -179,12 +179,12 @@ class Emulator:
             starved = not feed.waiting
             if (frame := self._next(feed)) is None:
                 if not self._stopping.is_set():
-                    self._say(f"radar: end of the source; {self}")
+                    self._log(f"radar: end of the source; {self}")
                 break
             if (behind := time.monotonic() - due) > (_ON_TIME if starved else _CATCH_UP):
                 if not self.late:
                     why = "the source" if starved else "this machine"
-                    self._say(f"radar: frame {self.frames + 1} is {behind * 1e3:.0f} ms late: {why} is too slow")
+                    self._log(f"radar: frame {self.frames + 1} is {behind * 1e3:.0f} ms late: {why} is too slow")
                 self.late += 1
                 self.lateness += behind
                 due += behind

@@ -1,4 +1,4 @@
-"""Frames made ahead of time, in a process of their own, so that making them does not disturb the packets' timing."""
+"""Frames made ahead of time in a separate process, so that computing them does not disturb the packets' timing."""
 
 import queue
 import signal
@@ -12,15 +12,15 @@ from radarsim.emulator.source import Source
 
 
 class Feed:
-    """Frames of a source for one configuration, from the first one on.
+    """Buffered frames of a source for one configuration, from the first one on.
 
     Args:
-        source: gives the frames.
-        config: to make them for.
-        ahead: how many frames may wait; then the source does.
+        source: source of the frames.
+        config: configuration to make them for.
+        ahead: number of frames to buffer.
 
     Attributes:
-        failure: why the source gives no more frames, if it failed.
+        failure: error of the source, if it failed.
     """
 
     def __init__(self, source: Source, config: RadarConfig, ahead: int):
@@ -37,10 +37,10 @@ class Feed:
         self._thread.start()
 
     def next(self, timeout: float) -> bytes | None:
-        """The next frame; None after the last one.
+        """Return the next frame; None after the last one.
 
         Raises:
-            TimeoutError: it is not ready.
+            TimeoutError: no frame is ready in time.
             InputError: the source failed.
         """
         try:
@@ -48,18 +48,18 @@ class Feed:
         except queue.Empty:
             raise TimeoutError from None
         if not isinstance(item, bytes):
-            self._frames.put(item)  # the end stays the end
+            self._frames.put(item)  # later calls get the end as well
         if isinstance(item, InputError):
             raise item
         return item
 
     @property
     def waiting(self) -> int:
-        """Frames that are ready."""
+        """Number of frames that are ready."""
         return self._frames.qsize()
 
     def close(self) -> None:
-        """End the process."""
+        """End the process that makes frames."""
         self._closed.set()
         self._process.terminate()
         self._process.join()

@@ -1,7 +1,7 @@
-"""Data side of the DCA1000: LVDS in, UDP packets out, at the board's pace.
+"""Data side of the emulated DCA1000: LVDS bytes in, UDP packets out, at the board's rate.
 
-The board fills packets with whatever comes, regardless of frames, so the end of a frame waits for the next one. When
-nothing has come for 2 s, it sends what is left and a status that the recording is completed: so in a real capture.
+The board fills packets regardless of frame borders, so the end of a frame is sent with the next frame. After 2 s
+without data it sends the rest and a status that the recording is completed, as a real board does.
 """
 
 import threading
@@ -15,28 +15,28 @@ from radarsim.emulator.disturbance import Disturbance
 SILENCE = 2.0  # s
 MEMORY = 256 << 20  # the board's, bytes
 _NEVER = float("inf")
-#: Catching up, this many times as fast as time passes, and this much (s) at once: receivers have small buffers.
+#: While catching up: speed relative to real time, and longest burst (s), because receivers have small buffers.
 _SPEED, _BURST = 4.0, 10e-3
 _SHORTEST = 1e-4  # s, shortest wait worth going to sleep for
 #: Time on the wire, s: 1456 bytes of samples and 52 of headers and gaps at 1 Gbit/s. With it, delays of 5, 10, 25 and
-#: 50 us give 683, 526, 314 and 188 Mbit/s of samples; SPRUIJ4A says 706, 545, 325 and 193 with headers.
+#: 50 us give 683, 526, 314 and 188 Mbit/s of samples; SPRUIJ4A specifies 706, 545, 325 and 193 including headers.
 _WIRE_TIME = 8e-9 * (MAX_PAYLOAD + 52)
 
 
 class Link:
-    """Packs the radar's bytes and sends them.
+    """Packetise the radar's bytes and send them at the board's rate.
 
-    Time passes in `advance` and `take` alone, which one thread calls; `start` and `stop` may come from another.
+    Only `advance` and `take`, called from one thread, wait; `start` and `stop` may be called from another.
 
     Args:
-        send: sends a UDP payload to the computer's data port.
-        report: sends a status to its command port.
-        disturbance: of the packets on their way.
-        clock, sleep: seconds.
+        send: function that sends a UDP payload to the computer's data port.
+        report: function that sends a status to its command port.
+        disturbance: network faults of the packets.
+        clock, sleep: time functions, s.
 
     Attributes:
-        recording: between `start` and `stop`, or completion.
-        packets: sent, before disturbance, since power-up.
+        recording: whether the board records: from `start` to `stop` or completion.
+        packets: number of packets sent since power-up, before network faults.
     """
 
     def __init__(
@@ -52,15 +52,15 @@ class Link:
         self._clock, self._sleep = clock, sleep
         self._lock = threading.Lock()
         self.recording, self.packets = False, 0
-        self._credit = _BURST  # s that may be made up for at once
+        self._credit = _BURST  # s that may be caught up with at once
         self._waited = (clock(), clock())  # until when, and since when
         self._clear()
 
     def _clear(self) -> None:
         self._waiting = bytearray()
         self._sequence, self._offset = 1, 0
-        self._free = 0.0  # when the next packet may leave
-        self._last: float | None = None  # when bytes came last
+        self._free = 0.0  # earliest time of the next packet
+        self._last: float | None = None  # time of the last bytes
 
     def start(self, delay: float = 25e-6, payload: int = MAX_PAYLOAD) -> None:
         """Record from now on, with `delay` seconds between packets of `payload` bytes."""
@@ -70,13 +70,13 @@ class Link:
             self.recording = True
 
     def stop(self) -> None:
-        """Send what is left and record no more."""
+        """Send the remaining bytes and stop recording."""
         with self._lock:
             if self.recording:
                 self._finish()
 
     def take(self, data: bytes | memoryview, due: float) -> None:
-        """Bytes that have come over LVDS at `due`; lost unless recording."""
+        """Accept bytes that arrived over LVDS at time `due`; they are lost unless the board records."""
         self.advance(due)
         with self._lock:
             if not self.recording:
@@ -90,7 +90,7 @@ class Link:
         self.advance(due)
 
     def advance(self, until: float) -> None:
-        """Wait until then, sending what leaves before."""
+        """Wait until a time and send the packets due before."""
         while True:
             with self._lock:
                 departure = self._departure()
@@ -113,7 +113,7 @@ class Link:
             self._sleep(left)
 
     def _departure(self) -> float:
-        """When the next packet leaves, if nothing more comes."""
+        """Time of the next packet if no more bytes arrive."""
         if not self.recording or self._last is None:
             return _NEVER
         return max(self._free, self._last) if len(self._waiting) >= self._payload else self._last + SILENCE

@@ -1,4 +1,4 @@
-"""A walk through a scene as what the virtual radar sees, simulated as it goes."""
+"""Source of a virtual radar's samples: a walk through a scene, simulated while it is sent."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from radarsim.world.scene import Scene
 
 @dataclass(frozen=True)
 class Simulation:
-    """A walk through a scene, at whatever configuration the radar gets; as `radarsim simulate` makes it.
+    """Walk through a scene, simulated at the configuration that the radar receives; as `radarsim simulate` makes it.
 
     Attributes:
         scene, seed: as for `simulate`.
-        walk: how the radar goes.
+        walk: motion of the radar.
         radar: preset or configuration file expected over the UART.
-        loop: walk again, from the start, at the end.
+        loop: restart the walk at its end.
     """
 
     scene: str
@@ -35,23 +35,23 @@ class Simulation:
     loop: bool = False
 
     def expected(self) -> RadarConfig:
-        """The preset's, or the file's; refuses a scene that is not there."""
+        """Configuration of the preset or file; InputError if the scene does not exist."""
         find(self.scene)
         return load_config(self.radar)[0]
 
     def check(self, config: RadarConfig) -> None:
-        """Takes all that the chip can do, if the walk is long enough for a frame.
+        """Accept every configuration of the chip for which the walk has at least one frame.
 
         Raises:
-            InputError: it is not.
+            InputError: the walk is shorter than a frame.
         """
         duration = self.walk.duration
         if duration is not None and config.frames_within(duration) < 1:
             raise InputError(f"duration is {duration:g} s, expected at least one frame of {config.frame_period} s")
 
     def frames(self, config: RadarConfig) -> Iterator[bytes]:
-        """Simulated some at a time, as `simulate` does."""
-        # Commands name no board, only a band: of its chip, the board is the one that was asked for.
+        """Yield frames, simulated in batches."""
+        # Commands name no board, only a band; use the requested board if its chip has that band.
         board = self.expected().board
         if load_board(board).chip == load_board(config.board).chip:
             config = config.changed("radar", board=board)

@@ -1,4 +1,4 @@
-"""Where the virtual radar's samples come from: a recording, or whatever else gives frames (`simulation`)."""
+"""Sources of the virtual radar's samples: the interface, and playback of a recording (`simulation` is another)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,40 +14,40 @@ from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
 
-#: By how much settings may differ from the recording's: programs round them, xwr_raw_ros to two digits (33.33 ms).
+#: Tolerances for settings against the recording's: programs round them, xwr_raw_ros to two digits (33.33 ms).
 _ROUNDING = 2e-4
-#: What does not change the samples that the radar sends: corrections for whoever reads them.
+#: Settings without influence on the samples that the radar sends: corrections applied by readers.
 NOT_IN_SAMPLES = {"board", "range_bias", "channel_calibration"}
-_KEPT = 256 << 20  # bytes of a recording that, played in a loop, are unpacked once
+_KEPT = 256 << 20  # bytes; a looped recording up to this size is unpacked only once
 
 
 class Source(Protocol):
-    """Gives frames; sent to another process, which makes them ahead of time."""
+    """Source of frames; it is sent to another process, which makes them ahead of time."""
 
     def expected(self) -> RadarConfig:
-        """The configuration to make frames for before one has come over the UART."""
+        """Configuration to make frames for until one arrives over the UART."""
 
     def check(self, config: RadarConfig) -> None:
-        """Refuse a configuration with an InputError."""
+        """Raise InputError for a configuration that the source cannot deliver."""
 
     def frames(self, config: RadarConfig) -> Iterator[bytes]:
-        """LVDS bytes of frame after frame."""
+        """Yield the LVDS bytes of each frame."""
 
 
 @dataclass(frozen=True)
 class Playback:
-    """The frames of a recording, as the radar that made it sent them.
+    """Playback of a recording's frames, as the radar that made it sent them.
 
     Attributes:
-        path: of the recording.
-        loop: begin again at the end.
+        path: path of the recording.
+        loop: restart at the end.
     """
 
     path: Path
     loop: bool = False
 
     def expected(self) -> RadarConfig:
-        """The recording's own."""
+        """Configuration of the recording."""
         with Recording(self.path) as recording:
             if not len(recording):
                 raise InputError(f"{self.path}: holds no frame, expected at least one to play")
@@ -55,19 +55,19 @@ class Playback:
             return recording.config
 
     def check(self, config: RadarConfig) -> None:
-        """Refuse any other configuration than the recording's, roundings aside.
+        """Accept only the recording's configuration, up to rounding.
 
         Raises:
-            InputError: naming the first field that differs.
+            InputError: names the first field that differs.
         """
         own = self.expected()
         for name in RadarConfig.model_fields:
             asked, recorded = getattr(config, name), getattr(own, name)
-            if name not in NOT_IN_SAMPLES | {"iq_order"} and not _alike(asked, recorded):
+            if name not in NOT_IN_SAMPLES | {"iq_order"} and not _equal(asked, recorded):
                 raise InputError(f"{name} is {asked}, expected {recorded} as in {self.path.name}, which is played")
 
     def frames(self, config: RadarConfig) -> Iterator[bytes]:
-        """One at a time, packed as `config` says."""
+        """Yield the frames, packed for the data format of `config`."""
         with Recording(self.path) as recording:
             numbers, kept = range(len(recording)), len(recording) * config.frame_bytes <= _KEPT
             frames: Iterator[bytes] = (
@@ -80,11 +80,11 @@ class Playback:
 
 
 def packed(frame: Int16[np.ndarray, "1 loop tx rx sample 2"], config: RadarConfig) -> bytes:
-    """A frame's LVDS bytes."""
+    """LVDS bytes of a frame."""
     return encode(frame, config).astype("<i2", copy=False).tobytes()
 
 
-def _alike(first: object, second: object) -> bool:
+def _equal(first: object, second: object) -> bool:
     one, other = (value if isinstance(value, tuple) else (value,) for value in (first, second))
     if not all(isinstance(number, float) for number in one + other):
         return first == second

@@ -1,4 +1,4 @@
-"""The serial port of the virtual radar: a pseudo-terminal at 115200 baud with the firmware's command line behind it."""
+"""Serial port of the virtual radar: a pseudo-terminal at 115200 baud with the firmware's command line."""
 
 import os
 import select
@@ -14,19 +14,19 @@ from radarsim.emulator.commandline import BANNER, PROMPT
 
 BAUD, _SPEED = 115200, termios.B115200
 _BYTE_TIME = 10 / BAUD  # s: start bit, eight, stop bit
-_BOOT_TIME = 0.3  # s, deaf after a reset
-_LONGEST_LINE = 255  # the firmware's buffer
+_BOOT_TIME = 0.3  # s without input after a reset
+_LONGEST_LINE = 255  # size of the firmware's buffer
 
 
 class Uart:
-    """A pseudo-terminal that passes lines on, and echoes and answers at the speed of a UART.
+    """Pseudo-terminal that echoes and answers lines at the speed of a UART.
 
     Args:
-        boot: called at power-up and after every reset; gives the function that answers lines.
-        link: symbolic link to make to the terminal, for a name that stays the same.
+        boot: function called at power-up and after every reset; it returns the function that answers lines.
+        link: symbolic link to the terminal to create, for a constant name.
 
     Attributes:
-        path: of the terminal.
+        path: path of the terminal.
 
     Raises:
         InputError: the link cannot be made.
@@ -37,7 +37,7 @@ class Uart:
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.path = os.ttyname(slave)
-        os.close(slave)  # so that the master sees whether a client is there
+        os.close(slave)  # so that the master detects whether a client is connected
         os.set_blocking(self._master, False)
         self._link = link
         if link is not None:
@@ -49,7 +49,7 @@ class Uart:
         self._thread.start()
 
     def reset(self) -> None:
-        """Reboot: what was configured is forgotten; deaf for a while, then the banner and a prompt."""
+        """Reboot: clear the configuration, ignore input for a while, then send banner and prompt."""
         self._reset.set()
 
     def close(self) -> None:
@@ -77,13 +77,13 @@ class Uart:
                 self._reboot()
             elif events.get(self._master, 0) & select.POLLIN:
                 self._take(self._read())
-            elif events:  # nobody has the port open
+            elif events:  # no client has the port open
                 time.sleep(0.01)
 
     def _reboot(self) -> None:
         self._closed.wait(_BOOT_TIME)
         self._reset.clear()
-        self._read()  # what came meanwhile is lost
+        self._read()  # input during the reboot is lost
         self._line.clear()
         self._execute = self._boot()
         self._write(BANNER.replace("\n", "\n\r") + PROMPT)
@@ -91,16 +91,16 @@ class Uart:
     def _read(self) -> bytes:
         try:
             return os.read(self._master, 65536)
-        except OSError:  # nothing there, or the client has just gone
+        except OSError:  # no input, or the client has just closed the port
             return b""
 
     def _take(self, data: bytes) -> None:
-        if termios.tcgetattr(self._master)[5] != _SPEED:  # bits read at another rate are other bytes
+        if termios.tcgetattr(self._master)[5] != _SPEED:  # another baud rate garbles the bytes
             self._write(bytes(0x80 | byte >> 1 for byte in data).decode("latin-1"))
             return
         for byte in data:
             if byte in b"\r\n":
-                # The firmware ends lines at either: after "\r\n" it prompts twice.
+                # The firmware accepts either line ending: after "\r\n" it sends two prompts.
                 self._answer("\r\n" if byte == ord("\r") else "\n")
             else:
                 self._line.append(byte)
@@ -119,5 +119,5 @@ class Uart:
         time.sleep(len(data) * _BYTE_TIME)
         try:
             os.write(self._master, data)
-        except OSError:  # nobody reads: a UART does not wait
+        except OSError:  # no reader: a UART does not wait
             pass

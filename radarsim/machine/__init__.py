@@ -1,1 +1,1 @@
-"""The machine that simulations run on: LLVM, threads, compiled kernels."""
+"""Set-up of the machine for simulation: LLVM, threads, compiled kernels."""

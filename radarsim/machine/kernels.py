@@ -1,4 +1,4 @@
-"""Compiled kernels of other sources than those that are here."""
+"""Removal of cached numba kernels that were compiled from other versions of the sources."""
 
 import os
 from collections.abc import Iterator
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 def drop_stale(package: Path) -> None:
-    """Forget a package's compiled kernels where any of its sources is another one than when this was last called.
+    """Delete a package's compiled kernels if any of its sources has changed since the last call.
 
-    Numba notices a change in a kernel's own file only, but kernels inline functions of the other files. Which of a
-    source and a kernel is newer does not matter: a version may be built before, and installed after, kernels of an
+    Numba detects changes of a kernel's own file only, but kernels inline functions of other files. Time stamps of
+    sources and kernels cannot be compared: a version may be built before, and installed after, the kernels of an
     earlier one were compiled.
     """
     cache = os.environ.get("NUMBA_CACHE_DIR")
@@ -21,7 +21,7 @@ def drop_stale(package: Path) -> None:
         if stamp.read_text() == sources:
             return
     for index in (Path(cache) if cache else package).rglob("*.nbi"):
-        with suppress(OSError):  # another process may be doing the same, or the folder is not ours
+        with suppress(OSError):  # another process does the same, or the folder is read-only
             index.unlink()
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
@@ -29,7 +29,7 @@ def drop_stale(package: Path) -> None:
 
 
 def _sources(package: Path, within: str = "") -> Iterator[tuple[str, int, int]]:
-    """Path, time of change (s) and size of each source."""
+    """Path, modification time (s) and size of each source."""
     for entry in os.scandir(package / within):
         name = f"{within}{entry.name}"
         if entry.is_dir() and entry.name != "__pycache__":

@@ -1,7 +1,7 @@
-"""Finds an LLVM that Dr.Jit can use, before Dr.Jit looks for itself.
+"""Choice of an LLVM library that Dr.Jit can use.
 
 Dr.Jit's LLVM back end aborts the process ("Cannot select: fmaximum") with libLLVM 14 to 16 on Sionna RT's kernels, and
-it takes the newest library it finds. So the library is chosen and its version checked here, and Dr.Jit is told through
+it loads the newest library that it finds. This module chooses the library, checks its version, and passes its path in
 ``DRJIT_LIBLLVM_PATH``.
 """
 
@@ -27,7 +27,7 @@ _PATTERNS = (
 
 
 def version(path: str) -> int:
-    """Major version of a libLLVM: asked of it (LLVMGetVersion, since 16), else by its name; 0 if unreadable."""
+    """Major version of a libLLVM, from the library (LLVMGetVersion, since 16) or its name; 0 if unreadable."""
     try:
         library = ctypes.CDLL(path)
     except OSError:
@@ -37,27 +37,27 @@ def version(path: str) -> int:
         library.LLVMGetVersion(ctypes.byref(major), None, None)
         return major.value
     except AttributeError:
-        # So it is older than 16, whatever it is called.
+        # Without that function it is older than 16, whatever its name is.
         return min(_named_version(path), 15)
 
 
 def _named_version(path: str) -> int:
-    """Major version that a file's name promises (``libLLVM-14.so.1``, ``libLLVM.so.19.1``), 0 if none."""
+    """Major version in a file's name (``libLLVM-14.so.1``, ``libLLVM.so.19.1``), 0 if none."""
     numbers = re.findall(r"\d+", os.path.basename(os.path.realpath(path)))
     return int(numbers[0]) if numbers else 0
 
 
 def installed() -> list[tuple[int, str]]:
-    """Every libLLVM of this machine as (major version by its name, path), newest first; none is loaded."""
+    """List every libLLVM of this machine as (major version by its name, path), newest first, without loading any."""
     paths = {os.path.realpath(path): path for pattern in _PATTERNS for path in glob.glob(pattern)}
     return sorted(((_named_version(path), path) for path in paths.values()), reverse=True)
 
 
 def find() -> tuple[str, int] | None:
-    """Path and major version of the newest usable libLLVM, or of the one that DRJIT_LIBLLVM_PATH names."""
+    """Path and major version of the newest usable libLLVM, or of the one in DRJIT_LIBLLVM_PATH."""
     if named := os.environ.get("DRJIT_LIBLLVM_PATH"):
         return named, version(named)
-    # Only files whose name promises a usable version are opened: loading several LLVMs into a process invites clashes.
+    # Only files with a usable version in their name are opened: several LLVMs in one process may clash.
     for promised, path in installed():
         if promised >= OLDEST and (major := version(path)) >= OLDEST:
             return path, major
@@ -68,10 +68,10 @@ def require() -> tuple[str, int]:
     """Make Dr.Jit use a suitable LLVM; call before anything imports drjit, mitsuba or sionna.
 
     Returns:
-        path and major version.
+        Path and major version.
 
     Raises:
-        InputError: there is none, with the command that installs one.
+        InputError: there is none; the message has the command that installs one.
     """
     found = find()
     if found is None:

@@ -1,4 +1,4 @@
-"""Random numbers by what they are for and when: none are drawn in turn, so that no frame hangs on another."""
+"""Random generators keyed by purpose and time, so that no frame depends on the order of others."""
 
 import zlib
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def keyed_rng(seed: int, purpose: str, time: float | None = None) -> np.random.Generator:
-    """A generator of its own for a purpose, or for an instant (s, told apart by the nanosecond) of it."""
+    """Return the random generator of a purpose, or of a time (s, to the nanosecond) within it."""
     instant = () if time is None else (round(time * 1e9) % 2**64,)
     key = (zlib.crc32(purpose.encode()), *instant)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

@@ -1,4 +1,4 @@
-"""How many processes simulate beside each other, and how many threads libraries may use."""
+"""Number of simulating processes, and of threads that libraries may use."""
 
 import os
 from collections.abc import Callable
@@ -10,17 +10,17 @@ from threadpoolctl import ThreadpoolController
 
 from radarsim.machine import llvm
 
-#: A simulating process's memory at its peak, bytes (benchmarks/dataset_speed.py measures it).
+#: Peak memory of a simulating process, bytes (measured by benchmarks/dataset_speed.py).
 MEMORY = 1.5e9
 
 
 def default_workers() -> int:
-    """One per core, as far as memory goes: processes share no locks, so two of one thread outrun one of two."""
+    """One process per core, limited by memory: two processes of one thread are faster than one of two."""
     return max(1, min(len(os.sched_getaffinity(0)), int(psutil.virtual_memory().available / MEMORY)))
 
 
 def share_with_drjit() -> None:
-    """Give Dr.Jit as many threads as Numba has here, this process's share of the cores (`radarize.io.jobs`)."""
+    """Give Dr.Jit as many threads as Numba has: this process's share of the cores (`radarize.io.jobs`)."""
     llvm.require()
     import drjit
 
@@ -29,11 +29,12 @@ def share_with_drjit() -> None:
 
 @cache
 def _libraries() -> ThreadpoolController:
-    return ThreadpoolController()  # of what is loaded at the first call
+    return ThreadpoolController()  # covers the libraries loaded at the first call
 
 
 def one_blas_thread(function: Callable) -> Callable:
-    """Numba's and Mitsuba's threads spin for work; a BLAS that wakes threads of its own beside them costs a third."""
+    """Limit BLAS to one thread: its threads would compete with Numba's and Mitsuba's spinning ones, which costs a
+    third."""
 
     @wraps(function)
     def limited(*arguments, **named):

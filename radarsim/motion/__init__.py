@@ -1,1 +1,1 @@
-"""How the sensor and people move: trajectories, planner, platforms."""
+"""Motion of the sensor and of people: trajectories, planner, platforms."""

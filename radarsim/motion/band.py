@@ -1,7 +1,7 @@
-"""Elastic bands: a shortest path over a grid becomes the line that a walker takes.
+"""Elastic bands: smooth a shortest path on a grid to a path that a person would take.
 
 After S. Quinlan and O. Khatib, "Elastic bands: connecting path planning and control", ICRA 1993: the line contracts,
-and the clearance map pushes it away from things.
+and the clearance map pushes it away from obstacles.
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ from scipy import ndimage
 from radarsim.world.clearance import Clearance
 
 STEP = 0.025  # m between points of a line
-SLACK = 0.03  # m that a line may come nearer than the path it is made from
-_SPARE = 0.35  # m beyond the necessary clearance within which things push
+SLACK = 0.03  # m of clearance that a line may lose against its path
+_SPARE = 0.35  # m beyond the required clearance within which obstacles push
 _ROUNDS = 60
 _WIDE, _NARROW = 0.7, 0.12  # m, smoothing length of the first and the last round
 
@@ -22,16 +22,16 @@ _WIDE, _NARROW = 0.7, 0.12  # m, smoothing length of the first and the last roun
 def relax(
     path: Float[np.ndarray, "n 2"], clearance: Clearance, radius: float, pins: Sequence[int] = ()
 ) -> Float[np.ndarray, "m 2"]:
-    """A smooth line with the path's ends.
+    """Smooth a path, with its ends fixed.
 
     Args:
-        path: with clearance of at least `radius`, m.
-        clearance: of the carrier.
-        radius: clearance to keep but for `SLACK`, m.
-        pins: indices into `path` of points that the line goes through.
+        path: path with clearance of at least `radius`, m.
+        clearance: clearance map of the carrier.
+        radius: clearance to keep, reduced by at most `SLACK`, m.
+        pins: indices of points in `path` that the line passes through.
 
     Returns:
-        Points about `STEP` apart.
+        Points of the line, about `STEP` apart.
     """
     line, marks, places = _resample(path), _lengths(path)[list(pins)], path[list(pins)]
     marks = marks / max(_lengths(path)[-1], 1e-9)
@@ -41,7 +41,8 @@ def relax(
         # Towards the ends, which stay, there is no push.
         along = _lengths(line)
         free = 1 - np.exp(-((np.minimum(along, along[-1] - along) / 0.4) ** 2))
-        # A point moves by a tenth of the smoothing length at most, or lines would jump from wall to wall in a doorway.
+        # Points move by at most a tenth of the smoothing length, so that lines do not jump between the walls of a
+        # doorway.
         line = line + (0.3 * free * np.minimum(near, 0.3 * sigma))[:, None] * clearance.uphill(line)
         line, marks = _pinned(line, marks, places)
         line = _resample(line)
@@ -51,7 +52,7 @@ def relax(
 
 
 def _rounded(path: Float[np.ndarray, "n 2"], clearance: Clearance, radius: float) -> Float[np.ndarray, "m 2"]:
-    """The path itself, rounded off as far as its clearance allows."""
+    """Round off a path as far as its clearance allows."""
     dense = _resample(path)
     for sigma in 0.3 * 0.8 ** np.arange(7):
         line = _smooth(dense, sigma)
@@ -61,20 +62,20 @@ def _rounded(path: Float[np.ndarray, "n 2"], clearance: Clearance, radius: float
 
 
 def _smooth(line: Float[np.ndarray, "n 2"], sigma: float) -> Float[np.ndarray, "n 2"]:
-    """Gaussian of `sigma` m along the line. Odd reflection at the ends keeps them where they are."""
+    """Smooth a line by a Gaussian of `sigma` m along it. Odd reflection at the ends keeps them fixed."""
     pad = min(int(4 * sigma / STEP), len(line) - 1)
     padded = np.pad(line, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
     return ndimage.gaussian_filter1d(padded, sigma / STEP, axis=0)[pad : pad + len(line)]
 
 
 def _pinned(line, marks, places):
-    """The line bent through its pins, and where along it they now are, as shares of its length."""
+    """Bend a line through its pins; return it and the pins' positions as fractions of its length."""
     if not len(places):
         return line, marks
     along = _lengths(line)
     at = np.searchsorted(along, marks * along[-1]).clip(1, len(line) - 2)
     for i, place in zip(at, places, strict=True):
-        # Bends reach as far as the neighbouring pins at most.
+        # Bends reach at most to the neighbouring pins.
         others = np.abs(along[np.setdiff1d(at, i)] - along[i]).min(initial=1.2)
         bend = np.exp(-((3 * (along - along[i]) / max(others, 4 * STEP)) ** 2))
         line = line + bend[:, None] * (place - line[i])

@@ -1,7 +1,7 @@
-"""From a line on the floor to a motion: pace, heading, gait.
+"""Motion along a planned path: speed, heading and gait.
 
-Speed along each leg follows from limits on acceleration and turn rate and from habit; a person adds steps and looks
-around. All is sampled at 100 Hz, smoothed over time and handed to C2 splines.
+Speed along each segment follows from limits on acceleration and turn rate and from the carrier's usual speed; a person
+adds gait and looks around. All is sampled at 100 Hz, smoothed over time and interpolated by C2 splines.
 """
 
 import numpy as np
@@ -15,29 +15,29 @@ from radarsim.motion.trajectory import Motion, Mounting
 
 STANDSTILL = 0.5  # at the start, s
 _RATE = 100.0  # Hz
-_MARGIN = 1.0  # s of motion before 0 (still) and after the end
-_BACKED = 22.0  # s, longest leg that is done backward instead of turning round
+_MARGIN = 1.0  # s of motion before 0 (at rest) and after the end
+_BACKED = 22.0  # s, longest segment that is driven backward instead of turning round
 
 
 def drive(
     carrier: Platform,
     mounting: Mounting,
     height: float,
-    legs: list[Float[np.ndarray, "n 2"]],
+    segments: list[Float[np.ndarray, "n 2"]],
     duration: float,
     rng: np.random.Generator,
 ) -> Motion:
-    """Move along legs, one after the other, from a standstill of `STANDSTILL` seconds.
+    """Move along path segments, one after the other, from a standstill of `STANDSTILL` seconds.
 
     Args:
-        carrier: how it moves.
+        carrier: platform.
         mounting: of the sensor on it.
         height: of the mounting's origin above z = 0, m.
-        legs: lines on the floor, m; one starts where the one before ends.
-        duration: s; inf: until the end of the last leg and half a second more.
-        rng: for habits, steps and glances.
+        segments: paths on the floor, m; each starts at the end of the one before.
+        duration: s; inf: until the end of the last segment and half a second more.
+        rng: random generator of speed, gait and glances.
     """
-    place, course = _timeline(carrier, legs, rng)
+    place, course = _timeline(carrier, segments, rng)
     if np.isinf(duration):
         duration = len(place) / _RATE - _MARGIN + STANDSTILL
     steps = int((duration + 2 * _MARGIN + 0.5) * _RATE)
@@ -72,25 +72,25 @@ def drive(
 
 
 def _timeline(
-    carrier: Platform, legs: list[np.ndarray], rng: np.random.Generator
+    carrier: Platform, segments: list[np.ndarray], rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "step 2"], Float[np.ndarray, "step"]]:
-    """Place and course of the carrier's front (rad, unwrapped) at 100 Hz, with turns on the spot between legs."""
+    """Position and course of the carrier (rad, unwrapped) at 100 Hz, with turns on the spot between segments."""
     still = int((_MARGIN + STANDSTILL + 4 * carrier.smoothing) * _RATE)
     places: list[np.ndarray] = []
     courses: list[np.ndarray] = []
-    for leg in legs:
-        place, course = _leg(carrier, leg, rng)
+    for segment in segments:
+        place, course = _segment(carrier, segment, rng)
         if not places:
             pause, turning = still, np.full(still, course[0])
         else:
             start = courses[-1][-1]
             change = _wrapped(course[0] - start)
-            short = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() < _BACKED * carrier.speed
+            short = np.linalg.norm(np.diff(segment, axis=0), axis=1).sum() < _BACKED * carrier.speed
             if short and abs(change) > 2.0 and rng.random() < carrier.reversing:
                 course = course + np.pi
                 change = _wrapped(course[0] - start)
             course = course + start + change - course[0]
-            # Smoothed over time later on, which takes longer than the turn itself.
+            # Smoothed over time below, which takes longer than the turn itself.
             pause = int((abs(change) / carrier.turn_rate + 2 * carrier.smoothing) * _RATE)
             turning = start + change * np.linspace(0, 1, pause)
         places += [np.tile(place[0], (pause, 1)), place]
@@ -98,11 +98,11 @@ def _timeline(
     return np.concatenate(places), np.concatenate(courses)
 
 
-def _leg(
-    carrier: Platform, leg: Float[np.ndarray, "n 2"], rng: np.random.Generator
+def _segment(
+    carrier: Platform, segment: Float[np.ndarray, "n 2"], rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m"]]:
-    """One leg from standstill to standstill, sampled at 100 Hz."""
-    ahead = np.diff(leg, axis=0)
+    """Motion along one segment from standstill to standstill, sampled at 100 Hz."""
+    ahead = np.diff(segment, axis=0)
     step = np.maximum(np.linalg.norm(ahead, axis=1), 1e-6)
     along = np.concatenate([[0], np.cumsum(step)])
     middle = (along[:-1] + along[1:]) / 2
@@ -112,7 +112,7 @@ def _leg(
     spread = 1.5 / step.mean()
     habit = gaussian_filter1d(rng.standard_normal(len(step)), spread) * np.sqrt(2 * np.sqrt(np.pi) * spread)
     pace = carrier.speed * np.clip(1 + carrier.unsteadiness * habit, 0.6, 1.4)
-    # Gait and turning add to the speed of a sensor in the hand.
+    # Gait and turning add to the speed of a handheld sensor.
     limit = np.minimum(pace, (0.8 if carrier.free_heading else 0.95) * carrier.top_speed)
     limit = np.minimum(limit, 0.8 * carrier.turn_rate / curvature)
     limit = np.minimum(limit, np.sqrt(carrier.acceleration / curvature))
@@ -125,12 +125,12 @@ def _leg(
     speed = np.sqrt(np.maximum(square, 0.0))
     clock = np.concatenate([[0], np.cumsum(2 * step / np.maximum(speed[:-1] + speed[1:], 1e-3))])
     at = np.interp(np.arange(0, clock[-1], 1 / _RATE), clock, along)
-    place = np.stack([np.interp(at, along, leg[:, k]) for k in range(2)], axis=1)
+    place = np.stack([np.interp(at, along, segment[:, k]) for k in range(2)], axis=1)
     return place, np.interp(at, middle, course)
 
 
 def _glances(time: Float[np.ndarray, "step"], rng: np.random.Generator) -> Float[np.ndarray, "step"]:
-    """How far a person faces away from the course, rad: mostly not, at times sideways, backward or looking around."""
+    """Angle between a person's facing and course, rad: mostly zero, at times sideways, backward or looking around."""
     angle, at = np.zeros(len(time)), 4.0
     while at < time[-1]:
         length = rng.uniform(3.0, 8.0)
@@ -158,11 +158,11 @@ def _follow(target: Float[np.ndarray, "step"], rate: float) -> Float[np.ndarray,
 
 
 def _wrapped(angle: float) -> float:
-    """To -pi...pi."""
+    """Wrap an angle to -pi...pi."""
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _ease(x: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """From 0 to 1 over 0...1 with two continuous derivatives."""
+    """Rise from 0 to 1 over 0...1 with two continuous derivatives."""
     x = np.clip(x, 0, 1)
     return x**3 * (10 - 15 * x + 6 * x**2)

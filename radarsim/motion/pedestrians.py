@@ -1,4 +1,4 @@
-"""People who walk about where the radar goes by: to and fro in the room that is left, and never into it."""
+"""Pedestrians who walk to and fro near the radar's path without colliding with it."""
 
 import numpy as np
 
@@ -10,24 +10,24 @@ from radarsim.world.clearance import LOWEST, Clearance, ground_level
 from radarsim.world.movers import Person
 from radarsim.world.scene import Scene
 
-#: Clearance of a person; m to which a person comes near the radar at least, and at most.
+#: Clearance of a person, m; smallest and largest distance at which a person passes the radar, m.
 _ROOM, _MET, _APART = 0.3, 3.0, 0.6
-#: How far from the radar's way a person starts, and how long the way to and fro is, m.
+#: Distance from the radar's path at which a person starts, and length of the person's path, m.
 _NEAR, _WAY = (0.8, 3.5), (1.5, 5.0)
 _ATTEMPTS = 60
 
 
-def crowded(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
-    """A scene with `count` people more.
+def with_pedestrians(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
+    """Return a scene with pedestrians added.
 
     Args:
-        scene: with room to walk.
-        motion: of the radar, which they keep 0.6 m away from.
-        count: of people; each comes within 3 m of the radar once.
-        seed: decides on their ways, speeds and heights.
+        scene: scene with free floor.
+        motion: motion of the radar; people keep a distance of 0.6 m.
+        count: number of people; each comes within 3 m of the radar once.
+        seed: seed of their paths, speeds and heights.
 
     Raises:
-        InputError: no room to move, or none that the radar does not need.
+        InputError: not enough free floor, or none away from the radar's path.
     """
     if not count:
         return scene
@@ -48,13 +48,14 @@ def crowded(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
             people.append(someone)
     if len(people) < count:
         raise InputError(
-            f"scene {scene.name}: has room for {len(people)} people beside the radar's way, expected {count}"
+            f"scene {scene.name}: has room for {len(people)} people beside the radar's path, expected {count}"
         )
     return Scene(scene.name, scene.objects, [*scene.movers, *people], scene.surface_settings, scene.interferers)
 
 
 def _way(ground: Ground, place: np.ndarray, rng: np.random.Generator) -> tuple[tuple[float, float], ...] | None:
-    """From somewhere near a place, in the same room or a room beside it, to somewhere near that; None if nothing is."""
+    """Path from a random point near a place to another one, in the same or a neighbouring room; None if there is
+    none."""
     apart = np.linalg.norm(ground.points - place, axis=1)
     reached = np.isfinite(ground.search(int(apart.argmin()), limit=2 * _NEAR[1])[0])
     starts = np.flatnonzero(reached & (apart > _NEAR[0]) & (apart < _NEAR[1]))

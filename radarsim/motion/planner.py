@@ -1,4 +1,4 @@
-"""Motions through a scene that touch nothing: tours of a platform, and walks through given way-points."""
+"""Collision-free motions through a scene: tours of a platform, and walks through given way-points."""
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +13,7 @@ from radarsim.world.clearance import Clearance, ground_level, nearest
 from radarsim.world.scene import Scene
 from radarsim.world.validation import naming
 
-CLEARANCE = 0.22  # of the sensor on the clearance map, m; of its real place it is 0.2 m or more
+CLEARANCE = 0.22  # m, of the sensor on the clearance map; its true clearance is at least 0.2 m
 _ATTEMPTS = 12
 
 
@@ -25,15 +25,15 @@ def plan_motion(
     waypoints: Float[np.ndarray, "n 2"] | None = None,
     mounting: Mounting | None = None,
 ) -> Motion:
-    """A tour through a scene, which comes back to places it has been; or a walk through given way-points.
+    """Plan a tour through a scene with loops, or a walk through given way-points.
 
     Args:
-        scene: to move in.
+        scene: scene to move in.
         platform: one of `PLATFORMS`.
         duration: s; None: as long as the way-points take.
-        rng: of every choice made.
-        waypoints: m; the motion ends soon after the last, and before `duration`.
-        mounting: of the sensor; default: the platform's lever arm, and a tilt drawn from its own.
+        rng: random generator.
+        waypoints: m; the motion ends shortly after the last one, at the latest after `duration`.
+        mounting: of the sensor; default: the platform's lever arm, and a random tilt.
 
     Raises:
         InputError: unknown platform, a duration that is not positive, no room to move in the scene, or a way-point that
@@ -56,17 +56,17 @@ def plan_motion(
     with naming(f"scene {scene.name}, platform {platform}"):
         if waypoints is not None:
             _check(scene, carrier, clearance, waypoints)
-            legs = route(clearance, carrier.radius, waypoints)
+            segments = route(clearance, carrier.radius, waypoints)
         limit = np.inf if duration is None or waypoints is not None else duration
         for _ in range(_ATTEMPTS):
             if waypoints is None:
                 room = max(carrier.radius, arm + CLEARANCE + 0.05)
                 length = carrier.speed * max(limit, 5.0)
-                legs = tour(clearance, carrier.radius, room, length, rng)
-            motion = drive(carrier, mounting, height, legs, limit, rng)
+                segments = tour(clearance, carrier.radius, room, length, rng)
+            motion = drive(carrier, mounting, height, segments, limit, rng)
             times = np.arange(-0.5, motion.duration + 1.0, 1 / 50.0)
             place = motion.position(times)[:, :2]
-            # Lever arm and gait move the sensor off the planned line, and add to its speed.
+            # Lever arm and gait move the sensor off the planned path, and add to its speed.
             touches = clearance.at(place) < CLEARANCE
             touches |= clearance.at(motion.path(times)[:, :2]) < carrier.footprint + 0.05
             if not touches.any() and np.linalg.norm(motion.velocity(times), axis=1).max() <= carrier.top_speed:
@@ -79,7 +79,7 @@ def plan_motion(
 
 
 def _check(scene: Scene, carrier: Platform, clearance: Clearance, places: Float[np.ndarray, "n 2"]) -> None:
-    """Refuse way-points too close to something, by name."""
+    """Raise InputError for way-points that are too close to an obstacle, with its name."""
     room = clearance.at(places)
     close = np.flatnonzero(room < carrier.radius - SLACK)
     if not len(close):

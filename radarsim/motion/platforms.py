@@ -1,4 +1,4 @@
-"""The carriers of the sensor (`platforms.yaml`): a hand, a cart, a small robot."""
+"""Platforms that carry the sensor (`platforms.yaml`): handheld, cart, robot."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from radarsim.world.clearance import LOWEST
 
 @dataclass(frozen=True)
 class Vibration:
-    """Random displacement of a carrier in each of the three axes, with a spectrum that falls by 1 / f^2 in a band.
+    """Random displacement of a platform in each axis, with a spectrum proportional to 1 / f^2 within a band.
 
     Attributes:
         band: lowest and highest frequency, Hz.
@@ -25,27 +25,27 @@ class Vibration:
 
 @dataclass(frozen=True)
 class Platform:
-    """What carries the sensor.
+    """Platform that carries the sensor.
 
     Attributes:
-        height: of the sensor, m.
+        height: height of the sensor, m.
         top: highest point of the carrier, m.
-        radius: clearance of the carrier's middle, m; the sensor's own is checked besides.
+        radius: clearance of the carrier's centre, m; the sensor's own clearance is checked as well.
         footprint: radius of the carrier itself, m.
-        speed: usual, m/s; slower in curves.
-        unsteadiness: standard deviation of the usual speed, as a share of it.
-        top_speed: never exceeded, m/s.
-        acceleration: m/s^2, along and across.
-        turn_rate: rad/s.
-        smoothing: of accelerations, s.
-        reversing: share of the shorter ways back that are done without turning round.
-        lever_arm: of the sensor from the carrier's axis, forward, m.
+        speed: usual speed, m/s; slower in curves.
+        unsteadiness: standard deviation of the usual speed, relative to it.
+        top_speed: maximum speed, m/s.
+        acceleration: maximum, along and across, m/s^2.
+        turn_rate: maximum, rad/s.
+        smoothing: time over which acceleration is smoothed, s.
+        reversing: probability that a short way back is driven backward instead of turning round.
+        lever_arm: of the sensor ahead of the carrier's axis, m.
         tilt: of the sensor's mount in pitch and roll, standard deviation, rad.
         bob: amplitude of the gait at 1 m/s, m; zero on wheels.
         sway: amplitude of the gait in roll, pitch, yaw, rad.
-        tremor: slow wander of roll and pitch, standard deviation, rad.
-        vibration: of the wheels, or of the hand.
-        free_heading: may face elsewhere than it goes.
+        tremor: slow random roll and pitch, standard deviation, rad.
+        vibration: vibration of wheels or hand.
+        free_heading: whether the heading may differ from the direction of motion.
     """
 
     height: float
@@ -69,7 +69,7 @@ class Platform:
 
     @property
     def body(self) -> tuple[float, float]:
-        """Lowest and highest point above the ground, m: everything between is an obstacle."""
+        """Lowest and highest point above the ground, m; everything between is an obstacle."""
         return LOWEST, self.top
 
 

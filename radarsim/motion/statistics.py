@@ -1,4 +1,4 @@
-"""What a motion amounts to: distance, speeds, turn rates, directions, clearance."""
+"""Statistics of a motion: distance, speeds, turn rates, directions, clearance."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -15,7 +15,7 @@ _STANDING = 0.05  # m/s
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of a motion from 0 to its end; speeds and distance are the sensor's, in the horizontal plane.
+    """Statistics of a motion from 0 to its end; speeds and distance are those of the sensor in the horizontal plane.
 
     Attributes:
         duration: s.
@@ -23,9 +23,9 @@ class Statistics:
         mean_speed, top_speed: m/s.
         rms_turn_rate, top_turn_rate: about the vertical, rad/s.
         rms_roll, rms_pitch: of the sensor, rad.
-        forward, backward, sideways, standing: shares of the time that what carries the sensor moves within 45 degrees
-            of where the sensor faces, within 45 degrees of the opposite, between, or not at all.
-        clearance: least distance of the sensor from anything but the ground, m; None without a scene.
+        forward, backward, sideways, standing: fractions of the time in which the platform moves within 45 degrees of
+            the sensor's heading, within 45 degrees of the opposite, in between, or not at all.
+        clearance: smallest distance of the sensor from anything but the ground, m; None without a scene.
     """
 
     duration: float
@@ -73,15 +73,15 @@ class Statistics:
 
     @classmethod
     def from_json(cls, text: str) -> "Statistics":
-        """As `json` wrote them."""
+        """Read statistics written by `json`."""
         return cls(**json.loads(text))
 
     def json(self) -> str:
-        """For an attribute of a recording."""
+        """Write as JSON text, for an attribute of a recording."""
         return json.dumps(asdict(self))
 
     def __str__(self) -> str:
-        """One line."""
+        """Summary in one line."""
         line = (
             f"{self.distance:.1f} m in {self.duration:.1f} s, mean {self.mean_speed:.2f} and at most "
             f"{self.top_speed:.2f} m/s, turning at {np.rad2deg(self.rms_turn_rate):.0f} deg/s (RMS, at most "
@@ -92,7 +92,7 @@ class Statistics:
 
 
 def crossings(motion: Motion, scene: Scene) -> str:
-    """A sentence that names the first thing the sensor passes through; empty if it passes through nothing."""
+    """Describe the first collision of the sensor in one sentence; empty if there is none."""
     t = np.append(np.arange(0, motion.duration, 1 / _RATE), motion.duration)
     place = motion.position(t)
     step = np.diff(place, axis=0)
@@ -105,7 +105,7 @@ def crossings(motion: Motion, scene: Scene) -> str:
     first = moved[struck[0]]
     names = sorted({scene.objects[i].name for i in scene.triangle_object[triangle[struck]]})
     what = repr(scene.objects[scene.triangle_object[triangle[struck[0]]]].name)
-    more = f" and {len(names) - 1} other things" if len(names) > 1 else ""
+    more = f" and {len(names) - 1} other objects" if len(names) > 1 else ""
     x, y, _ = place[first]
     return f"the sensor passes through {what}{more}, first at t = {t[first]:.2f} s, x {x:.2f}, y {y:.2f} m"
 

@@ -1,4 +1,4 @@
-"""Ways over the ground: tours that come back to where they began, and routes through given way-points."""
+"""Paths over the floor: tours that return to their start, and routes through given way-points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ from radarsim.world.clearance import RESOLUTION, Clearance
 
 _STRIDE = 2  # cells of the clearance map per cell of the search grid
 _CELL = _STRIDE * RESOLUTION
-_USED_COST = 2.5  # times the length for ground walked before, so that a way back is a loop if there is one
-_GOAL_AREA = 15.0  # m^2 of ground per goal to choose from
-_CHOICE = 3  # goals to choose from: the one with the best loop
-_REACH = 0.35  # of a tour's length, as far as the first goal lies
+_USED_COST = 2.5  # factor on the length of ground already used, so that the way back is a loop if there is one
+_GOAL_AREA = 15.0  # m^2 of floor per candidate goal
+_CHOICE = 3  # candidate goals; the one with the best loop is taken
+_REACH = 0.35  # largest distance of the first goal, relative to the tour's length
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Ground:
         points: nodes, m.
         clearance: of the nodes, m.
         edges: pairs of nodes.
-        costs: lengths of the edges, m, times what tells the middle of free space from its edge.
+        costs: cost of each edge: its length, m, times a factor that prefers the middle of free space.
     """
 
     points: Float[np.ndarray, "node 2"]
@@ -40,7 +40,7 @@ class Ground:
 
     @classmethod
     def of(cls, clearance: Clearance, radius: float, start: Float[np.ndarray, "2"] | None = None) -> "Ground":
-        """Nodes at least `radius` (m) from everything: the part around `start` (m), by default the largest.
+        """Build the graph of nodes at least `radius` (m) from obstacles: the part around `start` (m), or the largest.
 
         Raises:
             InputError: the largest part has less than a square metre.
@@ -72,7 +72,7 @@ class Ground:
     def search(
         self, start: int, used: Bool[np.ndarray, "node"] | None = None, limit: float = np.inf
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Cost to every node (inf beyond `limit`) and its predecessor; ground `used` before costs more."""
+        """Cost to every node (inf beyond `limit`) and its predecessor; nodes in `used` cost more."""
         costs = self.costs if used is None else self.costs * np.where(used, _USED_COST, 1.0)[self.edges].mean(axis=1)
         graph = coo_array((costs, tuple(self.edges.T)), shape=(len(self.points),) * 2).tocsr()
         return dijkstra(graph, directed=False, indices=start, return_predecessors=True, limit=limit)
@@ -94,20 +94,20 @@ class Ground:
 def tour(
     clearance: Clearance, radius: float, turning: float, length: float, rng: np.random.Generator
 ) -> list[Float[np.ndarray, "n 2"]]:
-    """A tour of at least `length` metres, as smooth legs: out from a home, and back another way where there is one.
+    """Plan a tour of at least `length` metres as smooth segments: away from home, and back another way if possible.
 
     Args:
-        clearance: of the platform's body.
+        clearance: clearance map of the platform's body.
         radius: clearance to keep, m.
-        turning: clearance of the places where it turns round, where there are any, m.
+        turning: clearance preferred where the platform turns round, m.
         length: m.
-        rng: for the goals.
+        rng: random generator of the goals.
 
     Returns:
-        Legs, each (points, 2) in m. One starts where the one before ends.
+        Path segments, each (points, 2) in m; each starts at the end of the one before.
 
     Raises:
-        InputError: no room to move.
+        InputError: not enough free floor.
     """
     ground = Ground.of(clearance, radius)
     goals = _goals(ground, turning, rng)
@@ -118,7 +118,7 @@ def tour(
     fresh: list[int] = []
     while travelled < length:
         fresh = fresh or [int(g) for g in rng.permutation(goals) if g != home]
-        # The first way round is short enough that the walk comes back to where it has been.
+        # The first loop is short enough that the walk revisits it.
         near = [g for g in fresh if travelled or 3.0 < cost[g] < _REACH * length] or fresh
         trips = [_round(ground, home, goal, float(cost[goal]), before) for goal in near[:_CHOICE]]
         goal, (out, back), _ = min(trips, key=lambda trip: trip[-1])
@@ -132,15 +132,15 @@ def tour(
 
 
 def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "m 2"]]:
-    """Smooth legs through way-points, in their order, by the shortest ways.
+    """Plan smooth segments through way-points, in their order, along shortest paths.
 
     Args:
-        clearance: of the platform's body.
+        clearance: clearance map of the platform's body.
         radius: clearance to keep, m.
         places: way-points with that clearance, m.
 
     Raises:
-        InputError: naming the first way-point that cannot be reached.
+        InputError: names the first way-point that cannot be reached.
     """
     ground = Ground.of(clearance, radius, places[0])
     gaps, stations = cKDTree(ground.points).query(places)
@@ -152,7 +152,8 @@ def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"])
             )
     path, pins = [places[:1]], [0]
     for start, end, place in zip(stations[:-1], stations[1:], places[1:], strict=True):
-        # Near way-points need no search of the whole floor; nodes at both ends give way to the way-points themselves.
+        # Near way-points no search of the whole floor is needed; the outer nodes are replaced by the way-points
+        # themselves.
         reach = 5 * float(np.linalg.norm(ground.points[start] - ground.points[end])) + 1
         cost, before = ground.search(int(start), limit=reach)
         if np.isinf(cost[end]):
@@ -171,10 +172,10 @@ def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"])
 def _round(
     ground: Ground, home: int, goal: int, cost: float, before: np.ndarray
 ) -> tuple[int, tuple[list[int], list[int]], float]:
-    """The goal, the ways there and back, and the share of the way back that is the way there."""
+    """Return the goal, the paths there and back, and the fraction of the way back that repeats the way there."""
     out = ground.way(before, goal)
     used = ground.around(out)
-    # The way there costs so much as a way back.
+    # Costs of the way there, as used ground.
     back = ground.way(ground.search(goal, used, limit=1.01 * _USED_COST * cost)[1], home)
     return goal, (out, back), float(used[back].mean())
 
@@ -192,8 +193,8 @@ def _goals(ground: Ground, turning: float, rng: np.random.Generator) -> np.ndarr
 
 
 def _reversals(path: Float[np.ndarray, "n 2"], pins: Sequence[int] | None = None) -> list[int]:
-    """Where a path doubles back (among `pins`, if given), and its two ends."""
-    # The direction over 0.4 m to each side tells a corner from a turn-around.
+    """Indices of points where a path reverses (among `pins`, if given), and its two ends."""
+    # A reversal shows in the direction over 0.4 m to each side, a corner does not.
     reach = round(0.4 / _CELL)
     index = np.arange(len(path))
     ahead = path[np.minimum(index + reach, len(path) - 1)] - path

@@ -1,7 +1,7 @@
-"""How a sensor moves: smooth position and attitude at any time, with their exact derivatives.
+"""Motion of a sensor: smooth position and attitude at any time, with their exact derivatives.
 
-A body follows a C2 spline in position and attitude; the sensor sits on it with a lever arm and a fixed tilt. So its
-velocity holds the lever arm's share, and Doppler follows from the same functions that give the path length.
+A body follows C2 splines in position and attitude; the sensor is mounted on it with a lever arm and a fixed tilt. Its
+velocity includes the lever arm's part, and Doppler follows from the same functions as the path length.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,17 +16,17 @@ from scipy.spatial.transform import Rotation, RotationSpline
 from radarize.io.errors import InputError
 from radarize.io.tum import read_tum
 
-_FASTEST = 20.0  # m/s between two poses of a file: beyond it, they are no positions in m or no times in s
-_SHARPEST = np.deg2rad(120)  # between two poses: beyond it, nobody knows which way round
+_FASTEST = 20.0  # m/s between two poses of a file; faster ones indicate wrong units of position or time
+_SHARPEST = np.deg2rad(120)  # between two poses; the sense of larger rotations is ambiguous
 
 
 @dataclass(frozen=True)
 class Mounting:
-    """Where a sensor sits on the body that carries it.
+    """Pose of a sensor on the body that carries it.
 
     Attributes:
-        lever_arm: sensor in the body frame, m.
-        rotation: sensor to body.
+        lever_arm: position of the sensor in the body frame, m.
+        rotation: sensor-to-body rotation.
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -34,16 +34,17 @@ class Mounting:
 
     @classmethod
     def of(cls, lever_arm: Sequence[float], tilt: Sequence[float]) -> "Mounting":
-        """From x, y, z in m (forward, left, up) and roll, pitch, yaw in degrees (pitch positive: nose down)."""
+        """Build a mounting from x, y, z in m (forward, left, up) and roll, pitch, yaw in degrees (pitch positive: nose
+        down)."""
         x, y, z = map(float, lever_arm)
         return cls((x, y, z), Rotation.from_euler("ZYX", tuple(tilt)[::-1], degrees=True))
 
     @classmethod
     def parse(cls, text: str) -> "Mounting":
-        """From six numbers in a line: x y z in m, roll pitch yaw in degrees.
+        """Parse six numbers in a line: x y z in m, roll pitch yaw in degrees.
 
         Raises:
-            InputError: anything else.
+            InputError: the text is anything else.
         """
         try:
             numbers = [float(word) for word in text.replace(",", " ").split()]
@@ -56,9 +57,9 @@ class Mounting:
 
 @dataclass(frozen=True)
 class Motion:
-    """A sensor on a moving body.
+    """Motion of a sensor on a moving body.
 
-    Times run from 0; outside the span of the splines the body stands still.
+    Times start at 0; outside of the span of the splines the body is at rest.
 
     Attributes:
         duration: s.
@@ -75,12 +76,12 @@ class Motion:
     mount: Rotation = Rotation.identity()
 
     def position(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
-        """Sensor in the world, m."""
+        """Position of the sensor in the world, m."""
         inside = self._inside(t)
         return self.path(inside) + turned(self.attitude(inside), self.lever_arm)
 
     def rotation(self, t: Float[np.ndarray, "n"]) -> Rotation:
-        """Sensor-to-world rotation."""
+        """Sensor-to-world rotation at times t, s."""
         return self.attitude(self._inside(t)) * self.mount
 
     def velocity(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
@@ -94,7 +95,7 @@ class Motion:
         return turned(self.mount.inv(), self.attitude(self._inside(t), 1)) * self._moving(t)
 
     def until(self, duration: float) -> "Motion":
-        """The same motion, ended after `duration` (s) at the latest."""
+        """Return the motion ended after `duration` (s) at the latest."""
         return replace(self, duration=min(self.duration, duration))
 
     def acceleration(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
@@ -105,7 +106,7 @@ class Motion:
         return (self.path(inside, 2) + turned(self.attitude(inside), swing)) * self._moving(t)
 
     def mounted(self, offset: tuple[float, float, float]) -> "Motion":
-        """Motion of something fixed beside the sensor, its axes parallel: `offset` in the sensor frame, m."""
+        """Return the motion of a point fixed at `offset` (m) in the sensor frame, with parallel axes."""
         return replace(self, lever_arm=tuple(np.asarray(self.lever_arm) + self.mount.apply(offset)))
 
     def _inside(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
@@ -124,7 +125,7 @@ class Motion:
         roll: float = 0.0,
         duration: float = 1.0,
     ) -> "Motion":
-        """Standing still; angles in rad, applied as roll, pitch, yaw (pitch positive: nose down)."""
+        """Motion of a sensor at rest; angles in rad, applied as roll, pitch, yaw (pitch positive: nose down)."""
         times = np.array([-1.0, duration + 1.0])
         turn = Rotation.from_euler("ZYX", np.tile([yaw, pitch, roll], (2, 1)))
         return cls(
@@ -141,8 +142,8 @@ class Motion:
         lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0),
         duration: float = 1.0,
     ) -> "Motion":
-        """Constant world `velocity` (m/s) and yaw rate (rad/s); the body passes `position` at t = 0."""
-        # Knots close enough that no turn between two exceeds half a right angle.
+        """Motion with constant world `velocity` (m/s) and yaw rate (rad/s); the body passes `position` at t = 0."""
+        # Knots so dense that the rotation between two is at most 45 degrees.
         begin, end = -1.0, duration + 1.0
         count = 2 + int(np.ceil(abs(yaw_rate) * (end - begin) / (np.pi / 4)))
         times = np.linspace(begin, end, count)
@@ -152,20 +153,20 @@ class Motion:
 
 
 def turned(rotation: Rotation, vectors: Float[np.ndarray, "*n 3"] | tuple) -> Float[np.ndarray, "n 3"]:
-    """Vectors turned, each as it would be alone: `Rotation.apply` adds up in another order where there is only one."""
+    """Rotate vectors, each bit-identical to rotating it alone (`Rotation.apply` sums a single one in another order)."""
     return (rotation.as_matrix() @ np.asarray(vectors, float)[..., None])[..., 0]
 
 
 def motion_from_tum(path: str | Path, mounting: Mounting | None = None) -> Motion:
-    """Motion through the poses of a TUM file (``time x y z qx qy qz qw``, ``#`` comments); its first pose is t = 0.
+    """Read a motion from the poses of a TUM file (``time x y z qx qy qz qw``, ``#`` comments); its first pose is t = 0.
 
     Args:
-        path: of poses of the sensor, or of a body that carries it.
+        path: file with poses of the sensor, or of a body that carries it.
         mounting: of the sensor on that body; default: the poses are the sensor's own.
 
     Raises:
-        InputError: missing file, wrong columns, something that is no finite number, stamps that do not ascend, a
-            quaternion that is not of unit length; poses that make no motion, see `motion_through`.
+        InputError: missing file, wrong columns, a value that is not finite, time stamps that do not ascend, a
+            quaternion that is not of unit length, or poses that make no motion, see `motion_through`.
     """
     stamps, poses = read_tum(path)
     return motion_through(stamps, poses, stamps[0], mounting, str(path))
@@ -178,18 +179,17 @@ def motion_through(
     mounting: Mounting | None,
     source: str,
 ) -> Motion:
-    """Motion through poses.
+    """Interpolate poses by a smooth motion.
 
     Args:
-        stamps: s, ascending.
-        poses: position, m, and quaternion x y z w.
-        start: stamp that is t = 0 of the motion.
-        mounting: of the sensor on the body that the poses are of; None: they are the sensor's own.
-        source: where they come from, for errors.
+        stamps: time stamps, s, ascending.
+        poses: positions, m, and quaternions x y z w.
+        start: time stamp of the motion's t = 0.
+        mounting: mounting of the sensor on the body of the poses; None: they are the sensor's own.
+        source: origin of the poses, for error messages.
 
     Raises:
-        InputError: fewer than four poses; poses too far from each other for a motion between them, or a gap in which a
-            smooth curve through them leaves them.
+        InputError: fewer than four poses, poses too far apart, or a gap in which a smooth curve deviates from them.
     """
     if len(stamps) < 4:
         raise InputError(f"{source}: {len(stamps)} poses, expected at least 4")
@@ -216,7 +216,7 @@ def motion_through(
     astray = np.linalg.norm(curve(times[:-1] + steps / 2) - (poses[:-1, :3] + poses[1:, :3]) / 2, axis=1)
     refuse(
         astray > 0.5 + chords,
-        lambda i: f"a smooth curve through the poses leaves them by {astray[i]:.2g} m",
+        lambda i: f"a smooth curve through the poses deviates from them by {astray[i]:.2g} m",
         "expected poses without such a gap or jump",
     )
     carried = mounting or Mounting()

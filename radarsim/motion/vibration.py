@@ -1,4 +1,4 @@
-"""Vibration of what carries the sensor: of wheels on a floor, and the tremor of a hand.
+"""Vibration of the platform: of wheels on a floor, and the tremor of a hand.
 
 A floor's unevenness has a spectrum of displacement G(n0) (n / n0)^-2 over the spatial frequency n (ISO 8608). Wheels at
 speed v turn it into G(n0) n0^2 v / f^2 over the frequency: within a band from f1 to f2 the variance is
@@ -23,17 +23,17 @@ from radarsim.motion.platforms import Vibration
 from radarsim.motion.trajectory import Motion
 
 _WAVES = 48  # cosines per axis
-_FINER = 4  # knots between two of the path: 200 Hz for a planned one
-_BUILDUP = 0.1  # s, over which the amplitude follows the speed
+_FINER = 4  # knots per knot of the path: 200 Hz for a planned one
+_BUILDUP = 0.1  # s, time over which the amplitude follows the speed
 
 
 def vibrating(motion: Motion, vibration: Vibration, rng: np.random.Generator) -> Motion:
-    """Add vibration to the position of a body, independent in the three axes.
+    """Add vibration to the position of a body, independently in the three axes.
 
     Args:
-        motion: of which body and sensor are moved; its attitude stays.
+        motion: motion of body and sensor; its attitude stays the same.
         vibration: band and level.
-        rng: of frequencies and phases.
+        rng: random generator of frequencies and phases.
     """
     knots = motion.path.x
     count = _FINER * (len(knots) - 1) + 1
@@ -46,6 +46,6 @@ def vibrating(motion: Motion, vibration: Vibration, rng: np.random.Generator) ->
     speed = np.linalg.norm(motion.path(time, 1)[:, :2], axis=1)
     rms = np.sqrt(vibration.rest**2 + vibration.rolling**2 * speed)
     rms = gaussian_filter1d(rms, _BUILDUP * (count - 1) / (knots[-1] - knots[0]), mode="nearest")
-    # A spline through all knots of another, and some between, is that other: only the vibration is added.
+    # Refining the spline's knots reproduces it exactly: only the vibration is added.
     path = CubicSpline(time, motion.path(time) + np.sqrt(2 / _WAVES) * rms[:, None] * waves)
     return replace(motion, path=path)

@@ -1,4 +1,4 @@
-"""How a radar is to go through a scene: a platform's own tour, through way-points, or along given poses."""
+"""Path of the radar through a scene: a platform's tour, through way-points, or along given poses."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,24 +15,23 @@ from radarsim.motion.vibration import vibrating
 from radarsim.motion.waypoints import read_waypoints
 from radarsim.world.scene import Scene
 
-_TOUR = 40.0  # s, unless asked for
+_TOUR = 40.0  # s, default duration of a tour
 
 
 @dataclass(frozen=True)
 class Walk:
-    """A way to go.
+    """Path of the radar.
 
     Attributes:
-        platform: ``handheld``, ``cart`` or ``robot``: how a planned tour moves.
-        duration: s; default: 40 s of a tour, or all of a trajectory or of way-points, which end the walk if shorter.
-        trajectory: TUM file of poses to follow instead of a planned tour; of the sensor, or if there is a mounting, of
+        platform: ``handheld``, ``cart`` or ``robot``: platform of a planned tour.
+        duration: s; default: 40 s for a tour, or all of a trajectory or of way-points, which may end earlier.
+        trajectory: TUM file of poses to follow instead of a planned tour: those of the sensor, or, with a mounting, of
             the body that carries it.
-        waypoints: places to go through on the platform instead of a tour, m, or a file of them
-            (`waypoints.read_waypoints`).
+        waypoints: way-points of the platform instead of a tour, m, or a file of them (`waypoints.read_waypoints`).
         mounting: of the sensor on the platform; default: the platform's own.
 
     Raises:
-        InputError: a duration that is not positive, or two ways at once.
+        InputError: a duration that is not positive, or both a trajectory and way-points.
     """
 
     platform: str = "handheld"
@@ -48,10 +47,10 @@ class Walk:
             raise InputError("both a trajectory and way-points are given, expected one of them")
 
     def through(self, scene: Scene, seed: int) -> Motion:
-        """The motion of the sensor through a scene; `seed` decides on all that a tour leaves open.
+        """Plan the motion of the sensor through a scene; `seed` determines the random choices of a tour.
 
         Raises:
-            InputError: unusable trajectory or way-points, or no room to move.
+            InputError: unusable trajectory or way-points, or not enough free floor.
         """
         if self.trajectory is not None:
             motion = motion_from_tum(self.trajectory, self.mounting)

@@ -1,4 +1,4 @@
-"""Way-points from a file: places x y that a walk goes through."""
+"""Way-points read from a file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,19 +12,18 @@ from radarize.io.files import read_text
 from radarize.io.tum import read_tum
 from radarize.io.yamlfile import read_yaml
 
-_APART = 0.5  # m between the way-points taken from a trajectory
+_APART = 0.5  # m between way-points taken from a trajectory
 
 
 def read_waypoints(path: str | Path) -> Float[np.ndarray, "n 2"]:
-    """Places in m.
+    """Read way-points x y in m.
 
     Args:
-        path: a YAML list of [x, y] (``.yaml``, alone or under the key ``waypoints``), a trajectory (``.tum``, of which
-            places half a metre apart are taken), or else lines of x and y, with commas or blanks between, which may
-            begin with a line of names.
+        path: a YAML list of [x, y] (``.yaml``, alone or under the key ``waypoints``), a trajectory (``.tum``, sampled
+            every half metre), or lines of x and y, separated by commas or blanks, with an optional header line.
 
     Raises:
-        InputError: missing or malformed file, something that is no finite number, fewer than two places.
+        InputError: missing or malformed file, a value that is not finite, fewer than two way-points.
     """
     path = Path(path)
     if path.suffix == ".tum":

@@ -1,1 +1,1 @@
-"""From a scene to propagation paths: scatterers, reflectors, visibility, amplitudes."""
+"""Propagation: every path from transmitter to receiver, with its length, amplitude and type."""

@@ -1,4 +1,4 @@
-"""The antenna element's gain pattern, the same for every transmitter and receiver."""
+"""Gain pattern of the antenna elements, the same for every transmitter and receiver."""
 
 from typing import NamedTuple
 
@@ -47,7 +47,7 @@ class Antenna(Frozen):
 
     @classmethod
     def of(cls, board: str | Board) -> "Antenna":
-        """The pattern in a board's file; isotropic where there is none."""
+        """Pattern of a board's file; isotropic if it has none."""
         given = load_board(board).front_end.get("antenna")
         return cls.model_validate(given) if given else ISOTROPIC
 
@@ -62,9 +62,9 @@ class GainPattern(NamedTuple):
     """Amplitude gain (square root of power gain) of an element, as compiled kernels take it.
 
     Attributes:
-        azimuth_gain, elevation_gain: against the absolute angle in steps of half a degree; the element's gain is their
-            product.
-        peak_gain: the largest there is in any direction.
+        azimuth_gain, elevation_gain: gain over the absolute angle in steps of half a degree; the element's gain is
+            their product.
+        peak_gain: largest gain in any direction.
     """
 
     azimuth_gain: Float[np.ndarray, "181"]
@@ -73,7 +73,7 @@ class GainPattern(NamedTuple):
 
 
 def gain_pattern(antenna: Antenna) -> GainPattern:
-    """Tables of an antenna's gain."""
+    """Tabulate an antenna's gain."""
     degrees = np.linspace(0, 90, 181)
     azimuth, elevation = (
         10 ** ((level - np.interp(degrees, cut.degrees, cut.loss_db)) / 20)
@@ -84,9 +84,9 @@ def gain_pattern(antenna: Antenna) -> GainPattern:
 
 @njit
 def amplitude_gain(x, y, z, pattern):
-    """Amplitude gain towards the sensor-frame direction (x, y, z), not necessarily normalised; 0 behind the board.
+    """Amplitude gain towards a direction (x, y, z) in the sensor frame, not necessarily normalised; 0 behind the board.
 
-    `pattern` is a `GainPattern`, or a `Observation`, which holds its fields.
+    `pattern` is a `GainPattern`, or an `Observation`, which has its fields.
     """
     if x <= 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""What apertures on a path leave of a wave, in Fresnel units: Kirchhoff's integral over polygons, rectangles."""
+"""Diffraction by apertures on a path, in Fresnel units: Kirchhoff's integral over polygons and rectangles."""
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -6,32 +6,32 @@ from numba import njit
 
 from radarsim.propagation.fields import dot, minus, vec
 
-#: Edges this far off the path, in units of the Fresnel integral, begin to fade from the sum, and those are left out:
-#: what they diffract comes on a path of its own, longer by s^2 lambda / 4.
+#: Distance of an edge from the path, in Fresnel units, from which its part of the sum fades, and from which it is left
+#: out: the edge diffracts along a path of its own, longer by s^2 lambda / 4.
 FADE, FAR = 3.0, 5.0
-#: The same for one-way paths to scatterers: there are many, and at 3 an edge diffracts -23 dB.
+#: The same for one-way paths to scatterers, which are many; at 3 an edge diffracts -23 dB.
 STRIP_FADE, STRIP_FAR = 2.0, 3.0
-#: Fresnel's integral over a slit is at most this.
+#: Largest value of Fresnel's integral over a slit.
 SLIT = 1.17
-#: Most corners that the overlap of three quadrilaterals and a square can have, and one to close it.
+#: Largest number of corners of the overlap of three quadrilaterals and a square, plus one to close it.
 CORNERS = 20
 
 
-def tails(
+def edge_integrals(
     radius: Float[np.ndarray, "radius"], angle: Float[np.ndarray, "angle"]
 ) -> Complex[np.ndarray, "radius angle"]:
-    """What an edge diffracts from a point of its line on, without the phase at that point:
+    """Integral along an edge from a point on it to infinity, without the phase at that point:
 
         int exp(j pi (t^2 - x^2) / 2) s / (s^2 + t^2) dt from x on,
 
-    with s = radius sin(angle), how far the edge's line is off the path, and x = radius cos(angle), where it begins,
-    Fresnel units. From x on the way turns by 45 deg into the complex plane, where the phase decays. Smooth in both,
-    since s / (s^2 + t^2) is an angle where the phase hardly turns: it is `angle` for none.
+    with s = radius sin(angle), the distance of the edge's line from the path, and x = radius cos(angle), where it
+    begins, in Fresnel units. The contour leaves x at 45 deg into the complex plane, where the phase decays. The result
+    is smooth in both, since s / (s^2 + t^2) is an angle where the phase hardly changes; without phase it is `angle`.
     """
     radius = np.maximum(radius, 1e-6)[:, None, None]
     s, x = radius * np.sin(angle)[:, None], radius * np.cos(angle)[:, None]
     nodes, weights = np.polynomial.legendre.leggauss(64)
-    around = radius  # as far as the pole at t = j s is from where it begins
+    around = radius  # distance of the pole at t = j s from the start
     last = np.arcsinh(4 / around)
     u = last * (nodes + 1) / 2
     turn = np.exp(0.25j * np.pi)
@@ -41,9 +41,9 @@ def tails(
 
 
 def _tabulated() -> tuple[tuple[float, float], Complex[np.ndarray, "radius angle"]]:
-    """Steps of radius and angle, and `tails` up to `FAR` either way."""
+    """Steps of radius and angle, and table of `edge_integrals` up to `FAR` in either."""
     radius, angle = np.linspace(0, np.sqrt(2) * FAR, 72), np.linspace(0, np.pi / 2, 36)
-    return (float(radius[1]), float(angle[1])), tails(radius, angle)
+    return (float(radius[1]), float(angle[1])), edge_integrals(radius, angle)
 
 
 _STEPS, _TAILS = _tabulated()
@@ -51,7 +51,7 @@ _STEPS, _TAILS = _tabulated()
 
 @njit
 def depth(planes, count, x, y):
-    """Distance of a point inside the nearest of some edges."""
+    """Distance of a point from the nearest of some edges, positive inside."""
     least = 1e9
     for k in range(count):
         least = min(least, planes[k, 2] - planes[k, 0] * x - planes[k, 1] * y)
@@ -60,7 +60,8 @@ def depth(planes, count, x, y):
 
 @njit(cache=True)
 def overlap(planes, count, polygon, spare):
-    """Corners, counter-clockwise, of what half planes n . x <= s leave of a wide square; returns their number."""
+    """Overlap of half planes n . x <= s with a wide square: writes its corners, counter-clockwise; returns their
+    number."""
     wide, corner = 50.0, 4
     for i in range(4):
         polygon[i, 0], polygon[i, 1] = wide if 0 < i < 3 else -wide, wide if i > 1 else -wide
@@ -112,14 +113,16 @@ def kirchhoff(polygon, corners):
 
 @njit
 def side(x0, y0, x1, y1, size):
-    """How far the origin is on the left of a side of this size, and where along it the side begins and ends."""
+    """Signed distance of the origin to the left of a side of this length, and start and end of the side along its
+    line."""
     dx, dy = (x1 - x0) / size, (y1 - y0) / size
     return x0 * dy - y0 * dx, x0 * dx + y0 * dy, x1 * dx + y1 * dy
 
 
 @njit(cache=True)
 def diffracted(s, low, high):
-    """What a side takes from 2 pi times `kirchhoff`, but for the angle that it fills; far ones fade.
+    """Diffraction integral of a side in 2 pi times `kirchhoff`, without the angle that the side subtends; fades far
+    off.
 
     It is int exp(j pi (s^2 + x^2) / 2) s / (s^2 + x^2) dx from low to high.
     """
@@ -135,14 +138,14 @@ def diffracted(s, low, high):
 
 @njit
 def _fading(distance):
-    """1 up to `FADE`, 0 from `FAR` on."""
+    """Weight 1 up to `FADE`, 0 from `FAR` on."""
     weight = min(max((FAR - abs(distance)) / (FAR - FADE), 0.0), 1.0)
     return weight * weight * (3 - 2 * weight)
 
 
 @njit(cache=True)
 def _tail(s, x):
-    """The same integral from x >= 0 on, faded as x grows; odd in s."""
+    """The integral of `diffracted` from x >= 0 on, fading as x grows; odd in s."""
     weight = _fading(x)
     if weight == 0:
         return 0j
@@ -160,7 +163,7 @@ def _tail(s, x):
 
 @njit
 def _cubic(at, count):
-    """Which four of `count` values at 0, 1, 2 ... lie about a place, and Lagrange's weights of them."""
+    """Indices of four of `count` values at 0, 1, 2 ... around a position, and their Lagrange weights."""
     first = min(max(int(at) - 1, 0), count - 4)
     t = at - first
     a, b, c = t - 1, t - 2, t - 3
@@ -168,10 +171,11 @@ def _cubic(at, count):
 
 
 @njit(cache=True)
-def strip(low, high):
-    """(1 / (1 + j)) int exp(j pi u^2 / 2) du from low to high: what a slit leaves; 1 for a wide one.
+def slit_diffraction(low, high):
+    """Amplitude behind a slit, (1 / (1 + j)) int exp(j pi u^2 / 2) du from low to high; 1 for a wide one.
 
-    Fresnel's integrals by the auxiliary functions f and g (Abramowitz and Stegun 7.3.9, 7.3.32, 7.3.33), good to 0.002.
+    Fresnel's integrals by the auxiliary functions f and g (Abramowitz and Stegun 7.3.9, 7.3.32, 7.3.33), accurate to
+    0.002.
     """
     return _from_middle(high) - _from_middle(low)
 
@@ -190,8 +194,8 @@ def _from_middle(u):
 
 
 @njit
-def misses(stop, way, square, aperture):
-    """Whether a path leaves nothing worth while: `passes` without a root, for a quick look."""
+def outside_aperture(stop, way, square, aperture):
+    """Whether a path leaves a negligible amplitude: a fast test, `aperture_diffraction` without a root."""
     center, normal, u, v, half_u, half_v = aperture
     offset, aside, cosine = minus(stop, center), dot(way, u), dot(way, normal)
     x, y = max(abs(dot(offset, u)) - half_u, 0.0), max(abs(dot(offset, v)) - half_v, 0.0)
@@ -201,15 +205,16 @@ def misses(stop, way, square, aperture):
 
 
 @njit
-def passes(stop, way, square, aperture):
-    """What the aperture of a mirror passes of a path in a direction over a stop on it.
+def aperture_diffraction(stop, way, square, aperture):
+    """Amplitude that a mirror's aperture passes along a path.
 
     Args:
-        stop: m.
-        way: unit direction of travel.
-        square: of the Fresnel unit across the path, m^2. In the mirror's plane it is longer along the plane of
-            incidence: by 1 / across along u, by across / cosine along v, which keeps its area and neglects its slant.
-        aperture: of the mirror, see `aperture`.
+        stop: point of reflection, m.
+        way: unit direction of propagation.
+        square: square of the Fresnel unit across the path, m^2. In the mirror's plane it is longer along the plane of
+            incidence: by 1 / across along u, by across / cosine along v, which preserves its area and neglects its
+                slant.
+        aperture: rectangle of the mirror, see `aperture`.
     """
     center, normal, u, v, half_u, half_v = aperture
     offset = minus(stop, center)
@@ -217,12 +222,12 @@ def passes(stop, way, square, aperture):
     across, size = np.sqrt(max(1 - aside * aside, 1e-6)), np.sqrt(square) + 1e-12
     along_u, along_v = across / size, cosine / (across * size)
     x, y, half_x, half_y = dot(offset, u) * along_u, dot(offset, v) * along_v, half_u * along_u, half_v * along_v
-    return strip(-half_x - x, half_x - x) * strip(-half_y - y, half_y - y)
+    return slit_diffraction(-half_x - x, half_x - x) * slit_diffraction(-half_y - y, half_y - y)
 
 
 @njit
 def aperture(flat, m):
-    """The rectangle that stands for a flat reflector: center, normal, u, v, half sides."""
+    """Rectangle that represents a flat reflector: center, normal, u, v, half sides."""
     return (
         vec(flat.center[m]), vec(flat.normal[m]), vec(flat.u[m]), vec(flat.v[m]), flat.half[m, 0], flat.half[m, 1]
     )  # fmt: skip
@@ -230,7 +235,7 @@ def aperture(flat, m):
 
 @njit(cache=True)
 def outlines(flat):
-    """Least and largest offset of each flat reflector's corners from its centre along u, and along v, m."""
+    """Smallest and largest offset of each flat reflector's corners from its centre along u and v, m."""
     out = np.zeros((len(flat.center), 4))
     for m in range(len(out)):
         for k in range(4):

@@ -1,7 +1,7 @@
-"""Spheres and cylinders in a tessellated mesh, known by their normals and corners.
+"""Recognition of spheres and cylinders in tessellated meshes by their normals and corners.
 
-As plates, the facets of a pipe or a lamp would reflect one after the other; as a round body it has one steady echo.
-Only whole bodies count: closed spheres, and cylinders that go all the way round, with caps or without.
+As plates, the facets of a pipe or a lamp would reflect one after the other; a round body has one steady echo.
+Only whole bodies are recognised: closed spheres, and full cylinders with or without caps.
 """
 
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float, Int
 
-#: A prism with at least this many sides stands for a cylinder.
+#: Smallest number of sides of a prism that represents a cylinder.
 FEWEST_SIDES = 8
-#: Corners lie on the round surface within this share of its radius.
+#: Largest distance of a corner from the round surface, relative to its radius.
 ROUND = 0.02
-#: An icosahedron's so many triangles cover 0.76 of the sphere through its corners, the most that so many do.
+#: An icosahedron covers 0.76 of the sphere through its corners, the maximum for its number of triangles.
 TOO_FEW = 20
 
 
@@ -29,7 +29,7 @@ class RoundBody:
 
 
 def recognise(mesh: trimesh.Trimesh) -> tuple[list[RoundBody], Bool[np.ndarray, "face"]]:
-    """Round bodies of a mesh, and which of its faces are their round sides."""
+    """Return the round bodies of a mesh, and a mask of the faces that they replace."""
     bodies, taken = [], np.zeros(len(mesh.faces), bool)
     fewest = 2 * FEWEST_SIDES  # each side of a prism is two triangles
     for faces in trimesh.graph.connected_components(
@@ -83,7 +83,7 @@ def _cylinder(
 
 
 def _round(points: Float[np.ndarray, "n d"]) -> tuple[Float[np.ndarray, "d"], float]:
-    """Center and radius of the circle or sphere through points: |p|^2 = 2 p . c + (r^2 - |c|^2), least squares."""
+    """Centre and radius of the circle or sphere through points: |p|^2 = 2 p . c + (r^2 - |c|^2), least squares."""
     middle = points.mean(axis=0)
     p = points - middle
     solved = np.linalg.lstsq(np.column_stack([2 * p, np.ones(len(p))]), np.sum(p * p, axis=1), 1e-9)[0]

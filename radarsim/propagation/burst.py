@@ -1,4 +1,4 @@
-"""The time axis of a burst, and path lengths as parabolas over it."""
+"""Time axis of a burst, and path lengths as parabolas over it."""
 
 from dataclasses import dataclass
 
@@ -14,11 +14,11 @@ NODES = np.array([-np.sqrt(3) / 2, 0.0, np.sqrt(3) / 2])
 
 @dataclass(frozen=True)
 class BurstClock:
-    """The burst's time axis: normalised time s = -1...1 over the chirps' ADC middles.
+    """Time axis of a burst: normalised time s = -1...1 over the centres of the chirps' ADC windows.
 
     Attributes:
-        middle: after the frame's stamp, s.
-        half: half the span, s.
+        middle: centre of the burst after the frame's time stamp, s.
+        half: half the duration, s.
     """
 
     middle: float
@@ -26,14 +26,14 @@ class BurstClock:
 
     @classmethod
     def of(cls, config: RadarConfig) -> "BurstClock":
-        """The clock of a configuration's frame."""
+        """Clock of a configuration's frame."""
         times = config.chirp_times
         half = max((times.max() - times.min()) / 2, config.chirp_time / 2)
         return cls(config.burst_center, half)
 
     @property
     def nodes(self) -> Float[np.ndarray, "3"]:
-        """Instants of `NODES` after the frame's stamp, s."""
+        """Times of `NODES` after the frame's time stamp, s."""
         return self.middle + self.half * NODES
 
 

@@ -1,4 +1,4 @@
-"""Which scatterers can make an echo worth having in which frame, before any ray test: near, ahead, and facing."""
+"""Selection of scatterers that may have a significant echo in a frame, before any ray test: near, ahead, and facing."""
 
 from dataclasses import dataclass
 
@@ -21,11 +21,11 @@ class Candidates(Table):
     Attributes:
         frame, scatterer: indices.
         distance: from the sensor, m.
-        straight: amplitude of the straight one-way path, 1/m (see `paths`).
-        echo: amplitude of the echo straight there and back.
-        size: amplitude of an echo over that of its one-way paths, for a surface that scatters fully from one into the
+        straight: amplitude of the direct one-way path, 1/m (see `paths`).
+        echo: amplitude of the direct echo.
+        size: amplitude of an echo relative to its one-way paths, for a surface that scatters fully from one into the
             other.
-        most: the same at most, whatever the scattering pattern.
+        most: upper bound of `size` over all scattering patterns.
     """
 
     frame: Int[np.ndarray, "candidate"]
@@ -38,7 +38,7 @@ class Candidates(Table):
 
     @classmethod
     def of(cls, observation: Observation, targets: Targets) -> "Candidates":
-        """Scatterers in range whose straight echo is above the threshold, or that have echoes over mirrors."""
+        """Select scatterers in range whose direct echo exceeds the threshold, or that have echoes over mirrors."""
         shape = observation.frames, len(targets.scatterers)
         count, index, columns = np.zeros(shape[0], np.int64), np.empty(shape, np.int32), np.empty((*shape, 5))
         _look(targets.scatterers.columns, targets.owner, observation, count, index, columns)
@@ -52,7 +52,7 @@ class Candidates(Table):
 
 @njit(parallel=True, cache=True)
 def _look(scatterers, owner, observation, count, index, columns):
-    """Per frame: how many candidates, their indices, and rows of the last five columns."""
+    """Per frame: number of candidates, their indices, and rows of the last five columns."""
     scale = observation.wavelength / (4 * np.pi) ** 1.5
     for frame in prange(len(observation.position)):
         position, rotation = vec(observation.position[frame]), observation.rotation[frame]
@@ -60,7 +60,7 @@ def _look(scatterers, owner, observation, count, index, columns):
         for i in range(len(scatterers.position)):
             d = minus(vec(scatterers.position[i]), position)
             square = dot(d, d)
-            # First what needs no root: most scatterers are too low in rank for their distance.
+            # First the test without a root: most scatterers have a rank too high for their distance.
             if square > observation.range**2 or square < 1e-4 or (owner[i] >= 0 and owner[i] != frame):
                 continue
             rank, mirrored = scatterers.rank[i], scatterers.bounces[i] > 0

@@ -1,4 +1,4 @@
-"""What the mirrors of a chain leave open together: a polygon across the unfolded path, in Fresnel units."""
+"""Common aperture of a chain of mirrors: a polygon across the unfolded path, in Fresnel units."""
 
 from typing import NamedTuple
 
@@ -9,13 +9,13 @@ from numba import njit
 from radarsim.propagation.apertures import CORNERS, FAR, depth
 from radarsim.propagation.fields import along, cross, dot, minus, mirrored, unit, vec
 
-#: Cosines of incidence up to which a mirror passes nothing, and from which on all that its aperture does: no other
-#: bound is met so that an echo would vanish in one step, since wide mirrors have room for it at any grazing angle.
+#: Cosines of incidence up to which a mirror passes nothing, and from which on it has no extra loss. Without this fade
+#: an echo would vanish in one step, since wide mirrors pass it at any grazing angle.
 GRAZING, CLEAR = 0.004, 0.02
 
 
 class Room(NamedTuple):
-    """Scratch for polygons: bounds as outward normals and offsets, and corners as `apertures.overlap` takes them."""
+    """Work space for polygons: bounds as outward normals and offsets, and corners for `apertures.overlap`."""
 
     planes: Float[np.ndarray, "14 3"]
     polygon: Float[np.ndarray, "corner 2"]
@@ -24,27 +24,27 @@ class Room(NamedTuple):
 
 @njit
 def scratch():
-    """Room for three quadrilaterals and the lines where their planes meet."""
+    """Allocate work space for three quadrilaterals and the lines where their planes meet."""
     return Room(np.empty((14, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
 
 
 @njit(cache=True)
 def window(way, p, path, ray, wavelength, flat, room):
-    """Bounds `room.planes` of a chain of mirrors that sets out from p along a ray.
+    """Compute the bounds `room.planes` of a chain of mirrors along a ray from p.
 
     Args:
         way: the mirrors.
-        path: length of the whole way, m.
+        path: length of the whole path, m.
 
     Returns:
-        how many bounds there are, -1 where nothing is left open; two axes across the ray; and what mirrors that are
-        met at grazing incidence leave of the amplitude.
+        Number of bounds, -1 if nothing is open; two axes across the ray; and the factor on the amplitude by mirrors at
+            grazing incidence.
     """
     normal, corners, planes = flat.normal, flat.corners, room.planes
     aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
     e1 = unit(cross(aside, ray))
     e2 = cross(ray, e1)
-    # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
+    # Instead of unfolding the mirrors, the path and its axes are folded; its start becomes an image.
     start, now, f1, f2 = p, ray, e1, e2
     count, before, last, left = 0, 0.0, ray, 1.0
     for k in range(len(way)):
@@ -91,7 +91,7 @@ def window(way, p, path, ray, wavelength, flat, room):
 
 @njit(cache=True)
 def inside(room, count, corners):
-    """Where a ray passes the polygon: on the path itself, or where an edge is near, a little inside."""
+    """Point where a ray passes the polygon: on the path itself, or, near an edge, a little inside."""
     mx, my = 0.0, 0.0
     for k in range(corners):
         mx += room.polygon[k, 0] / corners
@@ -106,15 +106,15 @@ def inside(room, count, corners):
 
 @njit
 def _junction(axes, last, mirror):
-    """The line where the planes of two mirrors of a chain meet, as `_bounded` takes it: no ray meets the second mirror
-    before the first, however far either runs on behind the other.
+    """Line where the planes of two consecutive mirrors meet, for `_bounded`: no ray meets the second mirror before the
+    first one, even if they extend behind each other.
 
     Args:
-        axes: the path's direction between the mirrors, and across it.
-        last, mirror: distance along the path, and normal, of either.
+        axes: direction of the path between the mirrors, and axes across it.
+        last, mirror: distance along the path, and normal, of each.
     """
     (now, f1, f2), (before, a), (t, b) = axes, last, mirror
-    # at x, y across the path, a mirror is met t - (x f1 + y f2) . n / (now . n) along it
+    # at offset x, y across the path, a mirror is met at t - (x f1 + y f2) . n / (now . n) along it
     x1, y1, x2, y2 = dot(f1, a), dot(f2, a), dot(f1, b), dot(f2, b)
     away, slope = dot(now, a), dot(now, b)
     nx, ny = x2 / slope - x1 / away, y2 / slope - y1 / away
@@ -125,11 +125,11 @@ def _junction(axes, last, mirror):
 
 @njit
 def _bounded(planes, count, line, path, wavelength):
-    """Bounds the polygon by a line across the path; returns the number of bounds, -1 where nothing is left.
+    """Bound the polygon by a line across the path; returns the number of bounds, -1 if nothing is left.
 
     Args:
         planes, count: bounds so far, outward normals and offsets in Fresnel units.
-        line: outward normal, offset (m), and how far along the path (m) it is nearest to it.
+        line: outward normal, offset (m), and distance along the path (m) of its nearest point.
         path, wavelength: m.
     """
     nx, ny, offset, at = line

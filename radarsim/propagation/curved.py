@@ -1,4 +1,4 @@
-"""The coherent echo of spheres and cylinders, from the point or the line that faces the radar.
+"""Coherent echo of spheres and cylinders, from the point or line of specular reflection.
 
 Physical optics of a round body (stationary phase across the curvature) is the wall's echo lambda / (8 pi h), h from the
 sensor to the nearest point, times sqrt(a / (a + h)) for each curved direction:
@@ -12,12 +12,12 @@ and one term per end that decays away from it:
     F = [G(u)] from u_1 to u_2,  G(u) = (C(u) + j S(u)) / (1 + j) = sign(u) (1/2 - E(|u|)),
     u = +-2 sqrt((L_end - L_line) / lambda), L the round trip.
 
-From the middle of the arrays, paths are isometries of the receiver as for plates: a half turn about the nearest line of
-the cylinder, inversions in its ends and in the sphere's nearest point. But that line or point wanders over the body as
-the sensor moves, and is another for each pair of antennas; held through a burst it makes the path wrong by
-delta^2 (1 / h - 1 / (a + h)) for a step delta across, which is 16 deg of phase at 0.3 m. So for each pair and instant
-the path goes by the point whose normal halves the angle (`path_over`); what a few steps towards it leave of its error
-enters by the square.
+Relative to the centre of the arrays, paths are isometries of the receiver as for plates: a half turn about the nearest
+line of the cylinder, inversions in its ends and in the sphere's nearest point. But that line or point moves over the
+body with the sensor, and differs for each pair of antennas; kept constant through a burst it causes a path error of
+delta^2 (1 / h - 1 / (a + h)) for a step delta across, which is 16 deg of phase at 0.3 m. So for each pair and time the
+path is taken over the point whose normal bisects the angle (`path_over`); the error that remains after a few iterations
+enters squared.
 """
 
 from dataclasses import dataclass
@@ -33,24 +33,24 @@ from radarsim.propagation.media import HEAD_ON
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.table import Table
 
-#: What a specular point is on: a sphere or an end of a cylinder, a cylinder lengthwise, a piece of a smooth surface.
+#: Kind of specular point: on a sphere or an end of a cylinder, along a cylinder, on a piece of a smooth surface.
 POINT, LINE, QUADRIC = 1.0, 2.0, 3.0
-#: Numbers of a curved surface in `SpecularPoints.geometry`.
+#: Columns of a curved surface in `SpecularPoints.geometry`.
 SHAPE = 13
-#: Square of an angle, rad^2: a normal that a step turns by less is found.
+#: Square of an angle, rad^2, at which the iteration for a normal stops.
 _STILL = 1e-22
 
 
 @dataclass(frozen=True)
 class SpecularPoints(Table):
-    """Where flat and curved reflectors echo by themselves: specular points, edges and corners.
+    """Specular points, edges and corners of flat and curved reflectors.
 
     Attributes:
-        facet: the flat reflector; -1: a curved one.
-        aim: a point for a ray to it to aim at, m.
+        facet: index of the flat reflector; -1: a curved one.
+        aim: end point of the visibility ray, m.
         geometry: of a flat reflector, the isometry of the receiver by rows (12 numbers). Of a curved one, `POINT`, a
             sphere or an end of a cylinder, or `LINE`, along a cylinder: a point of the axis, or the centre, m; the
-            axis; radius, m; zero. Or `QUADRIC`: its point in the middle, m; a principal direction; zero; the normal;
+            axis; radius, m; zero. Or `QUADRIC`: its central point, m; a principal direction; zero; the normal;
             the curvatures along that direction and across, 1/m.
         amplitude: square root of received over transmitted power, with phase.
     """
@@ -62,7 +62,7 @@ class SpecularPoints(Table):
 
     @property
     def isometry(self) -> Float[np.ndarray, "point 3 4"]:
-        """Isometries of the receiver, of flat reflectors."""
+        """Isometries of the receiver for flat reflectors."""
         return self.geometry[:, :12].reshape(-1, 3, 4)
 
 
@@ -97,11 +97,11 @@ class RoundBodies(Table):
         foot = some.center + radial[near] * (some.radius / rho[near])[:, None]
         height = np.stack([np.where(sphere, 0, z), -some.half, some.half], axis=1)  # along the axis
         slant = np.hypot(h[:, None], height - z[:, None])
-        # Fresnel's integral to the ends, phases referred to the path by each part: (1/2 - E(u)) exp(-j pi u^2 / 2)
+        # Fresnel's integral to the ends, phases relative to the path over each part: (1/2 - E(u)) exp(-j pi u^2 / 2)
         u = 2 * np.sqrt(2 * np.maximum(slant[:, 1:] - h[:, None], 0) / wavelength)
         side = np.where(
             height[:, 1:] >= z[:, None], 0.5, -0.5
-        )  # on the end itself, of two bodies that abut, one has it
+        )  # on the end itself: counted for one of two abutting bodies
         size = np.ones(height.shape, complex)
         size[:, 0] = side[:, 1] - side[:, 0]
         size[:, 1:] = side * [1, -1] * erfcx(np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi) * u)
@@ -124,15 +124,15 @@ class RoundBodies(Table):
 
 @njit
 def halving(body, one, two, steps):
-    """The normal of a round body that halves the angle between the ways to two places beside it.
+    """Normal of a round body that bisects the angle between the directions to two places.
 
     Args:
-        body: a point of its axis, the axis (of a sphere zero), radius; m.
+        body: a point of its axis, the axis (zero for a sphere), radius; m.
         one, two: the places, m.
-        steps: at most; each shrinks the error by at least the share of the radius in the distance.
+        steps: number of iterations; each reduces the error at least by the ratio of radius to distance.
 
     Returns:
-        the normal, and the ways to both places from there across the axis, m.
+        The normal, and the vectors from there to both places across the axis, m.
     """
     pivot, axis, radius = body
     a, b = minus(one, pivot), minus(two, pivot)
@@ -152,7 +152,7 @@ def _quadric(shape):
 
 @njit
 def path_over(shape, one, two):
-    """Length of the shortest way over a curved surface between two places beside one another, m."""
+    """Length of the shortest path over a curved surface between two nearby places, m."""
     if shape[0] == QUADRIC:
         return stationary(_quadric(shape), one, two)[1]
     body = vec(shape[1:4]), vec(shape[4:7]), shape[7]
@@ -165,7 +165,7 @@ def path_over(shape, one, two):
 
 @njit
 def facing_point(shape, place):
-    """The point of a curved surface that faces a place, m."""
+    """Point of a curved surface nearest to a place, m."""
     if shape[0] == QUADRIC:
         return stationary(_quadric(shape), place, place)[0]
     pivot, axis, radius = vec(shape[1:4]), vec(shape[4:7]), shape[7]
@@ -175,19 +175,20 @@ def facing_point(shape, place):
 
 @njit
 def stationary(quadric, one, two):
-    """Where a way between two places over a quadric is stationary, by Newton's steps.
+    """Stationary path between two places over a quadric, by Newton's method.
 
     Args:
         quadric: point, principal direction, normal, curvatures along the direction and across it (1/m).
 
     Returns:
-        the place there, m; the way's length, m; its Hessian over the two directions, 1/m, as h11, h22, h12; and that of
-        an endless plane.
+        The point of reflection, m; the path's length, m; its Hessian over the two directions, 1/m, as h11, h22, h12;
+        and
+            that of an infinite plane.
     """
     u1, u2 = 0.0, 0.0
     for _ in range(3):
         _, _, (h11, h22, h12), (p11, p22, _), (g1, g2) = growth(quadric, (u1, u2), one, two)
-        # near a caustic the place hardly matters
+        # near a caustic the exact point is irrelevant
         det = h11 * h22 - h12 * h12
         if abs(det) < 0.01 * p11 * p22:
             break
@@ -199,14 +200,14 @@ def stationary(quadric, one, two):
 
 @njit
 def growth(quadric, at, one, two):
-    """How a way between two places over a quadric grows about a point of that.
+    """Gradient and Hessian of a path between two places over a quadric at a point of the quadric.
 
     Args:
-        quadric, one, two: as of `stationary`.
-        at: how far along the principal directions the point is, m.
+        quadric, one, two: see `stationary`.
+        at: position of the point along the principal directions, m.
 
     Returns:
-        what `stationary` does, and minus the way's gradient.
+        The results of `stationary`, and the negative gradient of the path.
     """
     (point, axis, normal, bend1, bend2), (u1, u2) = quadric, at
     across = cross(normal, axis)
@@ -227,7 +228,7 @@ def growth(quadric, at, one, two):
 
 @njit
 def grazes(surface, one, two, least):
-    """Whether the cosine of incidence on a surface (point, normal) is below the least from either place."""
+    """Whether the cosine of incidence on a surface (point, normal) from either place is below a limit."""
     there, back = unit(minus(one, surface[0])), unit(minus(two, surface[0]))
     return dot(there, surface[1]) < least or dot(back, surface[1]) < least
 

@@ -1,4 +1,4 @@
-"""What surrounds the radar, and how a batch of frames looks at it: what every mechanism of `mechanisms` is given."""
+"""Environment of the radar, and its view from a batch of frames: the input of every mechanism in `mechanisms`."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,14 +21,14 @@ from radarsim.world.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Environment:
-    """The world as a radar meets it.
+    """World of a radar.
 
     Attributes:
-        scene: ray tests run on its geometry; None where nothing can stand in the way.
-        surface: the diffuse surface, or a given set of scatterers.
-        reflectors: flat and curved ones; None: there are none.
-        moving: what moves by itself.
-        obstacles: what stands in the way of rays.
+        scene: geometry for ray tests; None if there are no obstacles.
+        surface: diffuse surface, or a given set of scatterers.
+        reflectors: flat and curved reflectors; None: there are none.
+        moving: moving objects.
+        obstacles: obstacles on rays.
     """
 
     scene: Scene | None
@@ -42,22 +42,22 @@ class Environment:
         cls, scene: Scene | None, surface: Scattering, reflectors: Reflectors | None, config: RadarConfig,
         moving: MovingTargets | None = None,
     ) -> "Environment":  # fmt: skip
-        """The environment of a radar's configuration."""
+        """Build the environment of a radar's configuration."""
         moving = MovingTargets([], np.random.default_rng()) if moving is None else moving
         return cls(scene, surface, reflectors, moving, Obstacles.of(scene, moving, config))
 
     @property
     def detours(self) -> Detours:
-        """Of waves that are scattered twice and more."""
+        """Paths of waves that are scattered twice or more."""
         return self.surface.detours if isinstance(self.surface, Cluttered) else Detours.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """An environment as a batch of frames looks at it.
+    """View of an environment from the poses of a batch of frames.
 
     Attributes:
-        environment, observation: what, and from where.
+        environment, observation: the environment, and the poses.
     """
 
     environment: Environment
@@ -65,7 +65,7 @@ class View:
 
     @property
     def obstacles(self) -> Obstacles:
-        """What stands in the way of rays."""
+        """Obstacles on rays."""
         return self.environment.obstacles
 
     @cached_property
@@ -75,7 +75,7 @@ class View:
 
     @cached_property
     def candidates(self) -> Candidates:
-        """Scatterers that may echo, by frame."""
+        """Scatterers that may have an echo, by frame."""
         return Candidates.of(self.observation, self.targets)
 
     @cached_property
@@ -96,12 +96,12 @@ class View:
 
     @property
     def facing(self) -> Flat:
-        """Those, and after them the inner faces of hollow bodies, which mirror nothing."""
+        """Flat reflectors, followed by the inner faces of hollow bodies, which are not used as mirrors."""
         return self._reflectors[1]
 
     @cached_property
     def mirrors(self) -> list[Mirrors]:
-        """Of each frame, which of `flat` the radar sees, and which see one another."""
+        """For each frame, the reflectors in `flat` that are visible to the radar, and which are visible over others."""
         if self.environment.reflectors is None:
             return [Mirrors.none()] * self.observation.frames
         return visible_mirrors.find(self.observation, self.flat, self.obstacles)

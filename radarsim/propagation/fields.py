@@ -1,4 +1,4 @@
-"""What a ray meets on its way: the antenna's gain, mirrors with edges and polarisation, the surface that scatters it.
+"""Fields along a ray: the antenna's gain, mirrors with edges and polarisation, scattering surfaces.
 
 Vectors are tuples of three numbers, which compiled code keeps in registers.
 """
@@ -61,7 +61,7 @@ def mirrored(p, center, normal):
 
 @njit
 def write(a, out):
-    """Into the first three places of an array."""
+    """Write a vector to the first three elements of an array."""
     out[0], out[1], out[2] = a
 
 
@@ -87,16 +87,17 @@ def facing(normal, towards, two_sided):
 
 @njit
 def upright(up, direction):
-    """The field that the board's patches send, or take, along a unit direction: upright and across it."""
+    """Electric field that the board's patches transmit or receive along a unit direction: vertical and transverse to
+    it."""
     return unit(along(up, -dot(up, direction), direction))
 
 
 @njit
 def upwards(rotation):
-    """Where the board's upper edge points, of a sensor that is turned so to the world.
+    """Direction of the board's upper edge in the world for a rotated sensor.
 
-    It leans forward by nothing that matters, so that straight up and down have a field, too: along boresight, as the
-    directions before them have.
+    A negligible tilt forward defines the field straight up and down: along boresight, as in the limit of nearby
+    directions.
     """
     lean = 1e-6
     return (
@@ -107,20 +108,20 @@ def upwards(rotation):
 
 @njit
 def sent(up, direction):
-    """The field that sets out, as a complex vector."""
+    """Transmitted field as a complex vector."""
     x, y, z = upright(up, direction)
     return x + 0j, y + 0j, z + 0j
 
 
 @njit
 def reflected(field, arriving, leaving, normal, layer):
-    """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
+    """Transverse field after reflection: TE and TM parts times their Fresnel coefficients.
 
     Args:
         field: complex vector.
-        arriving, leaving: unit directions of travel.
+        arriving, leaving: unit directions of propagation.
         normal: of the mirror, on either side.
-        layer: what it is made of (`media.layer`).
+        layer: material of the mirror (`media.layer`).
     """
     te, tm = mirror(layer, min(abs(dot(arriving, normal)), 1.0))
     across = cross(arriving, normal)

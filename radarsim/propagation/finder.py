@@ -1,4 +1,4 @@
-"""Finds the propagation paths of a batch of frames: every mechanism by itself, then what moves over the burst.
+"""Propagation paths of a batch of frames: each mechanism's paths, then the motion of targets during the burst.
 
 A new mechanism is a file in `mechanisms` with `find(view) -> Paths`, and its name in `MECHANISMS`.
 """
@@ -21,24 +21,24 @@ from radarsim.propagation.surface import Scattering
 from radarsim.world import plugins
 from radarsim.world.scene import Scene
 
-#: Ways in which an echo comes about; plug-ins append theirs.
+#: Propagation mechanisms; plug-ins append theirs.
 MECHANISMS: list[Callable[[View], Paths]] = [
     diffuse.find, specular.find, image_chains.find, curved_ghosts.find, diffuse_multipath.find,
 ]  # fmt: skip
 
 
 class PathFinder:
-    """Finds the paths of a radar in a world.
+    """Find the propagation paths of a radar in a world.
 
     Args:
-        scene: ray tests run on its geometry; None where nothing can stand in the way.
-        surface: the diffuse surface, or a given set of scatterers.
-        reflectors: flat and curved ones; None: there are none.
+        scene: geometry for ray tests; None if there are no obstacles.
+        surface: diffuse surface, or a given set of scatterers.
+        reflectors: flat and curved reflectors; None: there are none.
         config: radar configuration.
         threshold: echoes below this amplitude are left out.
-        range: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
-        antenna: the elements' pattern; default: the board's.
-        moving: what moves by itself.
+        range: maximum one-way range, m; default: 5 % beyond the radar's maximum.
+        antenna: pattern of the elements; default: the board's.
+        moving: moving objects.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class PathFinder:
     def __call__(
         self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"], time: float = 0.0
     ) -> Paths:
-        """Paths for one sensor pose (rotation: sensor to world) in the middle of a burst at `time`, s."""
+        """Find the paths for one sensor pose (rotation: sensor to world) at the centre of a burst, `time` (s)."""
         return self.batch(np.asarray(position)[None], np.asarray(rotation)[None], np.array([time]))[0]
 
     def view(
@@ -70,7 +70,7 @@ class PathFinder:
         rotations: Float[np.ndarray, "frame 3 3"],
         times: Float[np.ndarray, "frame"],
     ) -> View:
-        """The environment from the poses of some frames; arguments as for `batch`."""
+        """View of the environment from the poses of some frames; arguments as for `batch`."""
         position, rotation, time = (np.ascontiguousarray(each, float) for each in (positions, rotations, times))
         observation = Observation(
             position, rotation, time, self.range, self.config.wavelength, self.threshold, *self._pattern
@@ -83,14 +83,14 @@ class PathFinder:
         rotations: Float[np.ndarray, "frame 3 3"],
         times: Float[np.ndarray, "frame"],
     ) -> list[Paths]:
-        """Paths of several frames together: ray tests and loops over scatterers are quicker in large numbers.
+        """Find the paths of several frames together: ray tests and loops over scatterers are faster in large numbers.
 
         Args:
-            positions, rotations, times: of the sensor in the middle of each burst; m, sensor to world, s.
+            positions, rotations, times: sensor poses at the centre of each burst; m, sensor to world, s.
         """
         view = self.view(positions, rotations, times)
         paths = Paths.joined([find(view) for find in MECHANISMS])
-        order = np.argsort(paths.frame.astype(np.uint16), kind="stable")  # of 16 bits in linear time
+        order = np.argsort(paths.frame.astype(np.uint16), kind="stable")  # NumPy sorts 16 bits in linear time
         paths = tracks.followed(view, self.config, paths[order])
         edges = np.searchsorted(paths.frame, np.arange(view.observation.frames + 1))
         return [paths[begin:end] for begin, end in zip(edges, edges[1:], strict=False)]

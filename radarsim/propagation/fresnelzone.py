@@ -1,22 +1,23 @@
-"""How much of a mirrored path is clear: obstacles over its first Fresnel zones, not on one ray.
+"""Obstruction of a mirrored path within its first Fresnel zones, instead of on a single ray.
 
-What a screen with openings leaves of a wave is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
+Behind a screen with openings the amplitude is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
 of sqrt(lambda d (L - d) / 2L), d along a path of length L. It is summed over the nodes of a Fibonacci lattice on a
-square of these units that ends smoothly; such a lattice shows a thin pole as many nodes whichever way it stands
-(Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show whether a stretch
-is partly clear, and only then more are looked at. What obstacles diffract from beyond the square is left out.
+square of these units with smooth borders; on such a lattice a thin pole covers the same number of nodes at any
+orientation (Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show
+whether a segment is partly clear, and only then more are tested. Diffraction by obstacles beyond the square is
+neglected.
 
-An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. Two screens on one path multiply
-only if they are far apart; in general (Vogler, Radio Science 17(6), 1982, of knife edges) the field is the double
-integral over both of
+An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. The losses of two screens on one path
+multiply only if they are far apart; in general (Vogler, Radio Science 17(6), 1982, of knife edges) the field is the
+double integral over both of
 
     exp(j pi (u_1^2 + u_2^2 - 2 rho u_1 . u_2) / (2 (1 - rho^2))),  rho = sqrt(d_1 (L - d_2) / (d_2 (L - d_1))),
 
-a complex normal distribution of correlation rho: one screen for rho = 1, an obstacle at the mirror, two that multiply
-for rho = 0, an obstacle at the radar. A half plane half way to a mirror that just touches the path leaves
-1/4 + asin(1/3) / (2 pi) = -10.3 dB. What echoes like a point has rho = 0 wherever the obstacle is, since a point sends
-its own wave back: the ways to it and back multiply; an edge or a cylinder does so across its line. For the same reason
-the single rays to scatterers (`paths`), which count twice, have the right mean power in the shadow of an edge.
+a complex normal distribution of correlation rho: one screen for rho = 1, an obstacle at the mirror; two factors that
+multiply for rho = 0, an obstacle at the radar. A half plane half way to a mirror whose edge touches the path leaves
+1/4 + asin(1/3) / (2 pi) = -10.3 dB. A point scatterer has rho = 0 wherever the obstacle is, because it radiates a wave
+of its own: the factors of both directions multiply; for an edge or a cylinder this holds across its line. For the same
+reason the single rays to scatterers (`paths`), which count twice, have the correct mean power in the shadow of an edge.
 """
 
 from dataclasses import dataclass, replace
@@ -34,77 +35,77 @@ from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table
 
-#: Slabs are looked for in the way of echoes that are at least this much stronger than the threshold.
+#: Slabs on a path are tested for echoes that exceed the threshold at least by this factor.
 LEAST_LOSS = 4.0
-#: The same for zones: some 16 dB over noise.
+#: The same for Fresnel zones: some 16 dB over noise.
 LEAST_SPLIT = 20.0
-#: Echoes that are at least this much stronger are free of steps, some 40 dB over noise: by zones of narrow mirrors and
-#: points, and by where borders pass between nodes.
+#: Echoes that exceed the threshold at least by this factor, some 40 dB over noise, are free of steps: zones of narrow
+#: mirrors and points, and borders between nodes, are resolved.
 LEAST_SMOOTH = 400.0
-#: At the radar rays are so far apart, as a share of what they are at a mirror.
+#: Distance between rays at the radar, relative to that at a mirror.
 AT_RADAR = 0.5
-#: Fewer nodes than this within a mirror say less than the one ray through its middle.
+#: Smallest number of nodes within a mirror; with fewer, the one ray through its middle is more accurate.
 _FEWEST = 4
-#: What mirrors leave open is narrow below this, Fresnel units.
+#: Openings of mirrors below this width are narrow, Fresnel units.
 _NARROW = 2.0
-#: Where an obstacle stands is known to this many halvings of a stretch, and a border to as many of a link.
+#: Number of bisections that locate an obstacle on a segment, and a border on a link.
 _HALVINGS = 4
-#: Rays to a point spread no wider than for an obstacle at this share of the way to it, so wide.
+#: Rays to a point are spread at most as for an obstacle at this fraction of the path, and by this factor.
 _BESIDE = 0.7
 _WIDEST = np.sqrt(2 * _BESIDE / (1 - _BESIDE))
 
 
 @dataclass(frozen=True)
-class Stretches(Table):
-    """Straight stretches of mirrored paths, in their order.
+class PathSegments(Table):
+    """Straight segments of mirrored paths, in their order.
 
     Attributes:
-        path: which path each is part of, ascending.
-        frame: index.
-        begin, end: m.
-        before, after: how far a Fresnel unit along either transverse axis moves begin and end, m.
-        mirrors: of the whole path, in order, within whose outlines its rays are reflected; -1: none.
-        stops: where on these, m.
-        apart: how far a Fresnel unit along either transverse axis moves the stops, m.
-        span: where on the whole path they begin and end, as shares of its length; the path comes back on the same
-            stretch if it ends in its middle.
-        mirroring: along either axis, whether its end mirrors, 1, or echoes like a point, 0.
+        path: index of the path, ascending.
+        frame: index of the frame.
+        begin, end: ends of the segment, m.
+        before, after: shift of begin and end per Fresnel unit along either transverse axis, m.
+        mirrors: mirrors of the whole path, in order, whose outlines bound its rays; -1: none.
+        stops: points of reflection on these, m.
+        apart: shift of the stops per Fresnel unit along either transverse axis, m.
+        span: start and end on the whole path, as fractions of its length; if the segment ends in the middle, the path
+            returns on it.
+        mirroring: along either axis, 1 if its end is a mirror, 0 if a point scatterer.
     """
 
-    path: Int[np.ndarray, "stretch"]
-    frame: Int[np.ndarray, "stretch"]
-    begin: Float[np.ndarray, "stretch 3"]
-    end: Float[np.ndarray, "stretch 3"]
-    before: Float[np.ndarray, "stretch 2 3"]
-    after: Float[np.ndarray, "stretch 2 3"]
-    mirrors: Int[np.ndarray, "stretch 3"]
-    stops: Float[np.ndarray, "stretch 3 3"]
-    apart: Float[np.ndarray, "stretch 3 2 3"]
-    span: Float[np.ndarray, "stretch 2"]
-    mirroring: Float[np.ndarray, "stretch 2"]
+    path: Int[np.ndarray, "segment"]
+    frame: Int[np.ndarray, "segment"]
+    begin: Float[np.ndarray, "segment 3"]
+    end: Float[np.ndarray, "segment 3"]
+    before: Float[np.ndarray, "segment 2 3"]
+    after: Float[np.ndarray, "segment 2 3"]
+    mirrors: Int[np.ndarray, "segment 3"]
+    stops: Float[np.ndarray, "segment 3 3"]
+    apart: Float[np.ndarray, "segment 3 2 3"]
+    span: Float[np.ndarray, "segment 2"]
+    mirroring: Float[np.ndarray, "segment 2"]
 
 
 def passage(
-    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "path"]
+    observation: Observation, flat: Flat, obstacles: Obstacles, segments: PathSegments, size: Float[np.ndarray, "path"]
 ) -> Passage:
-    """What is left of waves along whole paths, out and back.
+    """Factor on the amplitude of whole paths, out and back, by obstacles.
 
     Args:
-        observation, flat, obstacles: the frames, the mirrors, and what is in the way.
-        stretches: of the paths. A path of one stretch comes back on it.
-        size: amplitude of each path if all of it were clear. Slabs are looked for, and more than one ray, where it is
-            so much above the threshold that it matters.
+        observation, flat, obstacles: the frames, the mirrors, and the obstacles.
+        segments: segments of the paths. A path of one segment returns on it.
+        size: amplitude of each path if it were clear. Slabs, and more than one ray, are tested only for paths far
+            enough above the threshold.
     """
-    path, strength = stretches.path, size[stretches.path]
+    path, strength = segments.path, size[segments.path]
     worth = strength > LEAST_LOSS * observation.threshold
-    found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
-    rows, partly, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
+    found = obstacles.passage(observation, segments.frame, segments.begin, segments.end, worth)
+    rows, partly, place = _partly(observation, flat, obstacles, segments, strength, found.factor)
     smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
     fans, some = _fans(observation, flat, obstacles, partly, place, smooth)
     for column, new in zip(found.columns, some.columns, strict=True):
         column[rows] = new
     returns = np.bincount(path, minlength=len(size)) == 1
-    # Two screens: one that is met again on the way back, or on several stretches the first and the last one.
+    # Two screens: one that is met again on the way back, or, on several segments, the first and the last one.
     owner, first, count = np.unique(path[rows], return_index=True, return_counts=True)
     last = first + count - 1
     two = returns[owner] | (count > 1)
@@ -125,21 +126,21 @@ def passage(
 
 
 def _partly(
-    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches,
-    strength: Float[np.ndarray, "stretch"], factor: Complex[np.ndarray, "stretch"],
-) -> tuple[Int[np.ndarray, "partly"], Stretches, Float[np.ndarray, "partly"]]:  # fmt: skip
-    """Which stretches are partly clear, fitted to their mirrors, and where what is in the way stands, as a share of the
+    observation: Observation, flat: Flat, obstacles: Obstacles, segments: PathSegments,
+    strength: Float[np.ndarray, "segment"], factor: Complex[np.ndarray, "segment"],
+) -> tuple[Int[np.ndarray, "partly"], PathSegments, Float[np.ndarray, "partly"]]:  # fmt: skip
+    """Segments that are partly clear, fitted to their mirrors, and the position of the obstacle as a fraction of the
     whole path."""
-    long = np.any(stretches.begin != stretches.end, axis=1)
+    long = np.any(segments.begin != segments.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
     smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
-    fitted = _fitted(flat, stretches[rows], smooth)
+    fitted = _fitted(flat, segments[rows], smooth)
     few, begin, end, inside = _rays(flat, fitted, FEW, smooth * (_WIDEST - 1))
     clear = obstacles.clear(observation, fitted.frame[few], begin, end)
-    # Alike are all that are as the ray in the middle; then what that met is all there is.
+    # A segment is uniform if all rays equal the one in the middle, whose result then holds for the segment.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
     partly = (unlike > 0) & (inside.sum(axis=1) >= _FEWEST)
-    # Up to where rays come that meet something, of each stretch its first and last such.
+    # Position up to which obstructed rays are clear; of each segment the first and last such.
     hidden = np.flatnonzero(~clear & partly[few])
     number = np.arange(len(hidden)) - np.searchsorted(few[hidden], few[hidden])
     hidden = hidden[(number == 0) | (np.append(number[1:], 0) == 0)]
@@ -158,8 +159,8 @@ def _reach(
     two: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"]],
     through: Bool[np.ndarray, "ray"] | None = None,
 ) -> Float[np.ndarray, "ray"]:  # fmt: skip
-    """How far clear rays can move towards hidden ones (begin and end of either, m) before they are hidden, as a share
-    of the whole way; `through` as in `Obstacles.clear`."""
+    """Distance by which clear rays can move towards hidden ones (begin and end of either, m) before they are hidden, as
+    a fraction of the whole distance; `through` as in `Obstacles.clear`."""
     moved = np.zeros(len(frame))
     for step in 0.5 ** np.arange(1, _HALVINGS + 1):
         begin, end = (a + (moved + step)[:, None] * (b - a) for a, b in zip(one, two, strict=True))
@@ -167,31 +168,31 @@ def _reach(
     return moved + 0.5 ** (_HALVINGS + 1)
 
 
-def _fitted(flat: Flat, stretches: Stretches, smooth: Bool[np.ndarray, "stretch"]) -> Stretches:
-    """Stretches, some of which (`smooth`) so that nodes lie about the middle of what mirrors leave open, where that is
-    narrower than a zone.
+def _fitted(flat: Flat, segments: PathSegments, smooth: Bool[np.ndarray, "segment"]) -> PathSegments:
+    """Segments, with nodes shifted for some (`smooth`) to the middle of the mirrors' opening if that is narrower than a
+    zone.
 
-    What a small mirror sends straight back comes from it as from a point.
+    A small mirror scatters straight back like a point.
     """
-    edges = np.empty((len(stretches), 2, 2))
-    _open(flat.corners, flat.normal, stretches.columns, edges)
+    edges = np.empty((len(segments), 2, 2))
+    _open(flat.corners, flat.normal, segments.columns, edges)
     low, high = edges[..., 0], edges[..., 1]
     narrow = (low < high) & (high - low < _NARROW) & smooth[:, None]
     share, middle = np.ones(narrow.shape), np.zeros(narrow.shape)
     share[narrow] = (high - low)[narrow] / _NARROW
-    # Rays to all parts of a small plate aim at one place, so that these meet the same obstacles.
+    # Rays to all parts of a small plate end at one point, so that they meet the same obstacles.
     middle[narrow] = np.minimum(2 * (1 - share[narrow]), 1) * (low[narrow] + high[narrow]) / 2
-    at_radar, back = stretches.span[:, :1] == 0, stretches.span[:, 1:] == 0.5
-    mirroring = stretches.mirroring * np.where(back, share, 1)
-    spread = np.where(back, (1 - (1 - AT_RADAR) * mirroring) / (1 - (1 - AT_RADAR) * stretches.mirroring), share)
-    aside = np.where(at_radar, 0, middle), np.where(stretches.span[:, 1:] == 1, 0, middle)
+    at_radar, back = segments.span[:, :1] == 0, segments.span[:, 1:] == 0.5
+    mirroring = segments.mirroring * np.where(back, share, 1)
+    spread = np.where(back, (1 - (1 - AT_RADAR) * mirroring) / (1 - (1 - AT_RADAR) * segments.mirroring), share)
+    aside = np.where(at_radar, 0, middle), np.where(segments.span[:, 1:] == 1, 0, middle)
     return replace(
-        stretches,
-        begin=stretches.begin + np.einsum("sa,sad->sd", aside[0], stretches.before),
-        end=stretches.end + np.einsum("sa,sad->sd", aside[1], stretches.after),
-        before=stretches.before * spread[..., None], after=stretches.after * share[..., None],
-        stops=stretches.stops + np.einsum("sa,sgad->sgd", middle, stretches.apart),
-        apart=stretches.apart * share[:, None, :, None], mirroring=mirroring,
+        segments,
+        begin=segments.begin + np.einsum("sa,sad->sd", aside[0], segments.before),
+        end=segments.end + np.einsum("sa,sad->sd", aside[1], segments.after),
+        before=segments.before * spread[..., None], after=segments.after * share[..., None],
+        stops=segments.stops + np.einsum("sa,sgad->sgd", middle, segments.apart),
+        apart=segments.apart * share[:, None, :, None], mirroring=mirroring,
     )  # fmt: skip
 
 
@@ -199,26 +200,26 @@ def _fans(
     observation: Observation,
     flat: Flat,
     obstacles: Obstacles,
-    stretches: Stretches,
-    place: Float[np.ndarray, "stretch"],
-    smooth: Bool[np.ndarray, "stretch"],
-) -> tuple[Complex[np.ndarray, "stretch 2 node"], Passage]:
-    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m. Borders are looked
-    for between nodes of some (`smooth`).
+    segments: PathSegments,
+    place: Float[np.ndarray, "segment"],
+    smooth: Bool[np.ndarray, "segment"],
+) -> tuple[Complex[np.ndarray, "segment 2 node"], Passage]:
+    """Factors of many rays, zero beyond the mirrors' outlines; which rays are within; and delays, m. Borders between
+    nodes are located for some segments (`smooth`).
 
-    Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
+    Rays are straight and zones are not: the rays are spread such that they are correct at the obstacle.
     """
-    low, high = stretches.span.T
+    low, high = segments.span.T
     share = (place - low) / (high - low)
-    wide = np.sqrt(stretches.span * (1 - stretches.span))
+    wide = np.sqrt(segments.span * (1 - segments.span))
     wide = np.where(wide > 0, wide, AT_RADAR * wide[:, ::-1])
     mirror = np.sqrt(place * (1 - place)) / ((1 - share) * wide[:, 0] + share * wide[:, 1])
     point = np.sqrt(2 * share / (1 - np.minimum(share, _BESIDE)))
-    spread = mirror[:, None] + (point - mirror)[:, None] * (1 - stretches.mirroring)
+    spread = mirror[:, None] + (point - mirror)[:, None] * (1 - segments.mirroring)
     spread = np.maximum(spread, 0.25)[..., None]
-    shown = replace(stretches, before=stretches.before * spread, after=stretches.after * spread)
+    shown = replace(segments, before=segments.before * spread, after=segments.after * spread)
     many, begin, end, inside = _rays(flat, shown, MANY)
-    passed = obstacles.passage(observation, stretches.frame[many], begin, end, np.ones(len(many), bool))
+    passed = obstacles.passage(observation, segments.frame[many], begin, end, np.ones(len(many), bool))
     wavenumber, count = 2j * np.pi / observation.wavelength, len(share)
     power = np.abs(passed.factor) ** 2
     total = np.maximum(_sums(many, power, count), 1e-30)
@@ -227,7 +228,7 @@ def _fans(
     fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
     fans[:, 1][inside] = 1
     clear[inside] = passed.blocked == 0
-    _soften(observation, obstacles, stretches.frame, (begin, end, inside), passed, smooth, (fans[:, 0], clear))
+    _soften(observation, obstacles, segments.frame, (begin, end, inside), passed, smooth, (fans[:, 0], clear))
     whole = fans[:, 1] @ MANY.weight
     factor = _bounded(fans[:, 0] @ MANY.weight / whole, SLIT)
     through = _sums(many, power * passed.through, count) > total / 2
@@ -235,19 +236,20 @@ def _fans(
 
 
 def _soften(
-    observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "stretch"],
-    rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "stretch node"]],
-    passed: Passage, smooth: Bool[np.ndarray, "stretch"], values: tuple[np.ndarray, ...],
+    observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "segment"],
+    rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "segment node"]],
+    passed: Passage, smooth: Bool[np.ndarray, "segment"], values: tuple[np.ndarray, ...],
 ) -> None:  # fmt: skip
-    """Share values of nodes among those about which borders pass, by where on the links between nodes these are.
+    """Distribute values of nodes on either side of borders according to the borders' position on the links between
+    nodes.
 
     Args:
-        observation, obstacles: the frames, and what is in the way.
-        frame: of each stretch.
-        rays: of the nodes, begin and end, and which nodes of which stretch they are.
-        passed: of the rays.
-        smooth: which stretches.
-        values: of the nodes (stretch, node), written in place.
+        observation, obstacles: the frames, and the obstacles.
+        frame: frame of each segment.
+        rays: rays of the nodes, begin and end, and the mask of nodes of each segment.
+        passed: factors of the rays.
+        smooth: mask of segments.
+        values: values of the nodes (segment, node), modified in place.
     """
     begin, end, inside = rays
     state, number = np.full(inside.shape, -1, np.int8), np.zeros(inside.shape, int)
@@ -279,44 +281,44 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
 
 
-def _rays(flat: Flat, stretches: Stretches, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
-    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are.
+def _rays(flat: Flat, segments: PathSegments, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
+    """Rays within the mirrors' outlines: their segments, begin, end; and the mask of nodes of each segment.
 
-    The outermost rays to points begin by a share, `wider` (by stretch), farther apart: a zone is wider than the cone of
-    rays to its tip.
+    The outermost rays to points begin farther apart by a fraction `wider` (per segment): a zone is wider than the cone
+    of rays to its tip.
     """
-    inside = np.empty((len(stretches), len(lattice.nodes)), np.bool_)
-    _within(flat.corners, flat.normal, stretches.columns, lattice.nodes, inside)
+    inside = np.empty((len(segments), len(lattice.nodes)), np.bool_)
+    _within(flat.corners, flat.normal, segments.columns, lattice.nodes, inside)
     owner, node = np.nonzero(inside)
     begin, end = np.empty((2, len(owner), 3))
     nodes = lattice.nodes[node]
-    wide = np.broadcast_to(wider, len(stretches))[:, None] * (1 - stretches.mirroring)
+    wide = np.broadcast_to(wider, len(segments))[:, None] * (1 - segments.mirroring)
     cone = nodes * (1 + wide[owner] * (nodes / HALF) ** 2)
-    _spread(stretches.columns, owner, cone, nodes, begin, end)
+    _spread(segments.columns, owner, cone, nodes, begin, end)
     return owner, begin, end, inside
 
 
 @njit(cache=True)
-def _spread(stretches, owner, first, last, begin, end):
-    """Writes where rays begin and end, by their nodes at either end."""
+def _spread(segments, owner, first, last, begin, end):
+    """Write begin and end of rays from their nodes at either end."""
     for r in range(len(owner)):
         i = owner[r]
         for d in range(3):
-            begin[r, d], end[r, d] = stretches.begin[i, d], stretches.end[i, d]
+            begin[r, d], end[r, d] = segments.begin[i, d], segments.end[i, d]
             for axis in range(2):
-                begin[r, d] += first[r, axis] * stretches.before[i, axis, d]
-                end[r, d] += last[r, axis] * stretches.after[i, axis, d]
+                begin[r, d] += first[r, axis] * segments.before[i, axis, d]
+                end[r, d] += last[r, axis] * segments.after[i, axis, d]
 
 
 @njit(cache=True)
-def _within(corners, normal, stretches, nodes, inside):
-    """Writes which nodes are within the mirrors of each stretch."""
+def _within(corners, normal, segments, nodes, inside):
+    """Mark the nodes within the mirrors of each segment."""
     bounds = np.empty((24, 3))
     for i in range(len(inside)):
-        if i > 0 and stretches.path[i] == stretches.path[i - 1]:
+        if i > 0 and segments.path[i] == segments.path[i - 1]:
             inside[i] = inside[i - 1]
             continue
-        count = _bounds(corners, normal, stretches, i, bounds)
+        count = _bounds(corners, normal, segments, i, bounds)
         for k in range(len(nodes)):
             inside[i, k] = True
             for c in range(count):
@@ -326,14 +328,14 @@ def _within(corners, normal, stretches, nodes, inside):
 
 
 @njit(cache=True)
-def _open(corners, normal, stretches, edges):
-    """Writes from where to where mirrors leave the axes of each stretch open, Fresnel units."""
+def _open(corners, normal, segments, edges):
+    """Write the interval that mirrors leave open on both axes of each segment, Fresnel units."""
     bounds = np.empty((24, 3))
     for i in range(len(edges)):
-        if i > 0 and stretches.path[i] == stretches.path[i - 1]:
+        if i > 0 and segments.path[i] == segments.path[i - 1]:
             edges[i] = edges[i - 1]
             continue
-        count = _bounds(corners, normal, stretches, i, bounds)
+        count = _bounds(corners, normal, segments, i, bounds)
         for axis in range(2):
             low, high = -np.inf, np.inf
             for c in range(count):
@@ -346,17 +348,17 @@ def _open(corners, normal, stretches, edges):
 
 
 @njit
-def _bounds(corners, normal, stretches, i, out):
-    """Which rays of a path meet all of its mirrors, and each before the next: one that runs on behind another is lit
-    and seen up to where their planes meet. Writes functions of a node, 1, x and y, not negative for these; returns how
-    many."""
+def _bounds(corners, normal, segments, i, out):
+    """Bounds of the rays that meet all mirrors of a path in their order; a mirror that extends behind another is used
+    only up to the line where their planes meet. Writes linear functions of a node (1, x and y), not negative for such
+    rays; returns their number."""
     count = 0
     for g in range(3):
-        m = stretches.mirrors[i, g]
+        m = segments.mirrors[i, g]
         if m < 0:
             continue
-        stop, n = vec(stretches.stops[i, g]), vec(normal[m])
-        x, y = vec(stretches.apart[i, g, 0]), vec(stretches.apart[i, g, 1])
+        stop, n = vec(segments.stops[i, g]), vec(normal[m])
+        x, y = vec(segments.apart[i, g, 0]), vec(segments.apart[i, g, 1])
         one, two = minus(vec(corners[m, 2]), vec(corners[m, 0])), minus(vec(corners[m, 3]), vec(corners[m, 1]))
         turn = np.sign(dot(cross(one, two), n))
         for k in range(4):
@@ -364,7 +366,7 @@ def _bounds(corners, normal, stretches, i, out):
             inward = cross(n, minus(vec(corners[m, (k + 1) % 4]), one))
             count = _bound((turn, one, inward), (stop, x, y), out, count)
         for other in range(max(g - 1, 0), min(g + 2, 3)):
-            b = stretches.mirrors[i, other]
+            b = segments.mirrors[i, other]
             if b >= 0 and other != g:
                 corner, facing = vec(corners[b, 0]), vec(normal[b])
                 side = np.sign(dot(minus(stop, corner), facing))
@@ -374,7 +376,7 @@ def _bounds(corners, normal, stretches, i, out):
 
 @njit
 def _bound(plane, rays, out, count):
-    """Writes on which side of a plane (side, place, direction) rays are (stop, and by a node's x and y)."""
+    """Write on which side of a plane (side, place, direction) rays are (stop, and dependence on a node's x and y)."""
     side, place, direction = plane
     stop, x, y = rays
     out[count] = side * dot(minus(stop, place), direction), side * dot(x, direction), side * dot(y, direction)

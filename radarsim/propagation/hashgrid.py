@@ -1,4 +1,4 @@
-"""A hash grid: which of many boxes are near, at a cost that does not grow with the world."""
+"""Hash grid that finds nearby boxes at a cost independent of the size of the world."""
 
 from itertools import product
 
@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 
 class Grid:
-    """Axis-aligned boxes by the cells of space that they reach into.
+    """Axis-aligned boxes sorted by the cells that they touch.
 
     Args:
         low, high: corners, m.
@@ -28,7 +28,7 @@ class Grid:
         new = np.ones(len(box), bool)
         new[1:] = (cells[1:] != cells[:-1]).any(axis=1)
         keys = map(tuple, cells[new].tolist())
-        self._boxes = dict(zip(keys, np.split(box, np.flatnonzero(new)[1:]), strict=False))  # none where no box is
+        self._boxes = dict(zip(keys, np.split(box, np.flatnonzero(new)[1:]), strict=False))  # without empty cells
 
     def near(
         self, positions: Float[np.ndarray, "position 3"], reach: float
@@ -45,9 +45,9 @@ class Grid:
 
 
 def nearby_order(places: Float[np.ndarray, "place 3"], cell: float = 1.5) -> Int[np.ndarray, "place"]:
-    """Order in which places that follow one another are near one another: Morton's, by cells (m) in plan."""
+    """Order in which consecutive places are near each other: Morton's, by cells (m) in the horizontal plane."""
     x, y = (np.floor(places[:, :2] / cell).astype(int) & 31).T
-    return np.argsort(_SPREAD[x] | _SPREAD[y] << 1, kind="stable")  # of 16 bits in linear time
+    return np.argsort(_SPREAD[x] | _SPREAD[y] << 1, kind="stable")  # NumPy sorts 16 bits in linear time
 
 
 #: Numbers of five bits with room for another bit after each.

@@ -1,7 +1,7 @@
 """Nodes over a Fresnel zone and their weights, for one screen and for two (see `fresnelzone`).
 
-What borders leave clear of a node's cell is taken from the links between neighbouring nodes: half of each belongs to
-either node's cell, so what passes changes smoothly as a border moves across a link.
+The clear part of a node's cell is derived from the links between neighbouring nodes: half of each link belongs to
+either node's cell, so the amplitude changes smoothly as a border moves across a link.
 """
 
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ from scipy.special import erfc
 _RHOS = 10
 #: Half the side of the lattice's square, Fresnel units.
 HALF = 1.5
-#: What changes of the nodes' weights cost in the fit of these, beside errors of half planes.
+#: Cost of changes of the nodes' weights in their fit, relative to errors of half planes.
 _STIFF = 0.4
-#: How much more errors of upright and level half planes count in it.
+#: Additional weight of errors of vertical and horizontal half planes in the fit.
 _SQUARE = 8.0
 
 
@@ -32,11 +32,11 @@ class Lattice:
 
     @classmethod
     def fibonacci(cls, count: int, before: int) -> "Lattice":
-        """So many nodes, a Fibonacci number, and the one before.
+        """Build a Fibonacci lattice; `count` and `before` are consecutive Fibonacci numbers.
 
-        Weights are those of a square that ends smoothly, corrected (least squares) so that half planes, however they
-        stand, leave what Fresnel's integral says; else the square's borders would diffract. Near these what half planes
-        do fades, so that it does not begin with a step.
+        Weights are those of a square with smooth borders, corrected (least squares) so that half planes of any
+        orientation give Fresnel's integral; otherwise the square's borders would diffract. Near the borders the effect
+        of half planes fades, so that it does not start with a step.
         """
         k = np.arange(count)
         nodes = HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
@@ -49,7 +49,7 @@ class Lattice:
         inner = np.clip((HALF - np.abs(edge)) / 0.45, 0, 1)
         truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
         truth = lit + (truth - lit) * inner**2 * (3 - 2 * inner)
-        # As exact in the shadow as in the light, and more so for upright and level edges.
+        # As accurate in the shadow as in the light, and more so for vertical and horizontal edges.
         share = np.where(np.abs(np.sin(2 * angle)) < 1e-9, _SQUARE, 1) / np.maximum(np.abs(truth), 0.1)
         off, keep = (truth - clear @ weight) * share, _STIFF * count * np.eye(count)
         rows = np.concatenate([clear * share[:, None], keep])
@@ -74,12 +74,12 @@ class Lattice:
     @cached_property
     def couplings(self) -> Complex[np.ndarray, "kind rho node node"]:
         """Weights of pairs of nodes for two screens of correlation 0, 1 / `_RHOS`, ... 1, along both axes (kind 0), or
-        along the first one alone (1)."""
+        along the first one only (1)."""
         count = len(self.nodes)
         out = np.empty((2, _RHOS + 1, count, count), complex)
         out[:, 0], out[0, -1] = np.outer(self.weight, self.weight), np.diag(self.weight)
         taper = self.weight * np.exp(-0.5j * np.pi * np.sum(self.nodes**2, axis=1))
-        # The kernel is averaged over cells, which it varies within where rho is near 1.
+        # The kernel is averaged over cells, because it varies within them for rho near 1.
         cell = 2 * HALF / np.sqrt(count) * np.array([-0.25, 0.25])
         place = self.nodes[:, None] + np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
         for kind, step in [(0, k) for k in range(1, _RHOS)] + [(1, k) for k in range(1, _RHOS + 1)]:
@@ -89,7 +89,7 @@ class Lattice:
             pair = np.exp(-1j * np.pi * (scaled * rho) @ scaled.T) * own[:, None] * own
             pair = pair.reshape(count, 4, count, 4).sum(axis=(1, 3))
             pair /= pair.sum()
-            for _ in range(3):  # where the second screen is clear, the first one alone counts
+            for _ in range(3):  # a clear second screen must have no effect
                 scale = np.sqrt(self.weight / pair.sum(axis=1))
                 pair *= scale[:, None] * scale
             out[kind, step] = pair / pair.sum()
@@ -97,7 +97,8 @@ class Lattice:
 
 
 def shares(open_: Float[np.ndarray, "link"]) -> tuple[Float[np.ndarray, "link"], Float[np.ndarray, "link"]]:
-    """What is open of the halves of links, that of the open node first, if so much of each is from there on."""
+    """Open fraction of both halves of each link, that of the open node first, if the border is at `open_` from
+    there."""
     return np.minimum(2 * open_, 1), np.maximum(2 * open_ - 1, 0)
 
 
@@ -107,7 +108,7 @@ def _neighbours(nodes: Float[np.ndarray, "node 2"]) -> Int[np.ndarray, "link 2"]
 
 
 def _half_planes(inside: Float[np.ndarray, "plane node"], links: Int[np.ndarray, "link 2"]) -> np.ndarray:
-    """Share of each node's cell that lies in half planes, by how deep the nodes are inside."""
+    """Fraction of each node's cell within half planes, from the nodes' depth inside."""
     total, degree = np.zeros_like(inside), np.bincount(links.ravel(), minlength=inside.shape[1])
     for one, two in links:
         i, j = inside[:, one], inside[:, two]
@@ -126,7 +127,8 @@ def coupled(
     one: Complex[np.ndarray, "pair 2 node"], two: Complex[np.ndarray, "pair 2 node"], rho: Float[np.ndarray, "pair"],
     mirroring: Float[np.ndarray, "pair 2"], couplings: Complex[np.ndarray, "kind rho node node"],
 ) -> Complex[np.ndarray, "pair"]:  # fmt: skip
-    """What two screens leave, of correlation rho along axes that mirror; nan: too little lies within the outlines."""
+    """Amplitude behind two screens with correlation rho along mirroring axes; nan: too little is within the
+    outlines."""
     out = np.empty(len(rho), complex)
     _couple(np.ascontiguousarray(one), np.ascontiguousarray(two), rho, mirroring, couplings, out)
     return out

@@ -1,37 +1,36 @@
-"""Level of detail: how many of a surface's scatterers stand for it, seen from where the sensor is.
+"""Level of detail: the fraction of a surface's scatterers that is used, depending on distance and antenna gain.
 
-A resolution cell grows with range, so fewer scatterers a square metre make the same speckle; and where the antenna
-hardly looks (floor and ceiling near by), a few stand for many. So of the scatterers at distance r in a direction of
-amplitude gain g a share p = `FULL_DETAIL` / r sqrt(g / g_peak) is used, which keeps the number in a cell as it is. Each
-scatterer has a rank, drawn once, uniform in 0...1, and counts with the amplitude cos(pi rank / 4 p), zero from rank
-2 p on, over the root of its mean square over all ranks. So mean power is that of all of them, whatever p, and a
-scatterer comes and goes smoothly over a doubling of range: nothing pops, and speckle stays coherent along a walk
-(changing p by dp costs a share of about (dp / p)^2 of the power: 0.25 % for 10 cm at 2 m).
+A resolution cell grows with range, so fewer scatterers per square metre give the same speckle; at low antenna gain
+(floor and ceiling nearby), a few are enough, too. So of the scatterers at distance r in a direction of amplitude gain g
+a fraction p = `FULL_DETAIL` / r sqrt(g / g_peak) is used, which keeps the number in a cell constant. Each scatterer has
+a rank, drawn once, uniform in 0...1, and is weighted by the amplitude cos(pi rank / 4 p), zero from rank 2 p on, over
+its RMS over all ranks. So the mean power is that of all scatterers for any p, and a scatterer fades in and out smoothly
+over a doubling of range: speckle stays coherent along a walk (a change of p by dp decorrelates a fraction of about (dp
+/ p)^2 of the power: 0.25 % for 10 cm at 2 m).
 """
 
 import numpy as np
 from numba import njit
 
-#: Distance up to which about all scatterers in the middle of the beam are used, m.
+#: Distance up to which almost all scatterers in the middle of the beam are used, m.
 FULL_DETAIL = 0.9
-#: Where the antenna does not look at all, mirrors may show a scatterer all the same: least share of the peak gain that
-#: is reckoned with.
+#: Smallest fraction of the peak gain assumed: scatterers outside of the beam may be visible over mirrors.
 LEAST_GAIN = 0.05
 
 
 @njit(inline="always")
 def share(gain, distance):
-    """Share of scatterers used at a distance (m) in a direction of amplitude gain (peak 1), straight."""
+    """Fraction of scatterers used at a distance (m) in a direction of amplitude gain (peak 1), on a direct path."""
     return FULL_DETAIL / distance * np.sqrt(min(max(gain, LEAST_GAIN), 1.0))
 
 
 @njit(inline="always")
 def detail(rank, used):
-    """Amplitude factor of a scatterer where a share is used; 1 for those of negative rank: they stand for themselves.
+    """Amplitude factor of a scatterer if a fraction is used; 1 for negative ranks, which represent only themselves.
 
     Args:
         rank: 0...1, or negative.
-        used: share of scatterers, as `share` gives it, may exceed 1.
+        used: fraction of scatterers, from `share`, may exceed 1.
     """
     if rank < 0.0:
         return 1.0

@@ -1,30 +1,30 @@
-"""What surfaces do with a wave: Fresnel coefficients, slabs, roughness, scattering.
+"""Interaction of waves with surfaces: Fresnel coefficients, slabs, roughness, scattering.
 
 A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material (hollow: a
-cabinet of boards, a stud wall); its inner faces lie that much further in. A thin closed body is one slab as thick as
-itself. All else is an opaque half space. What a slab reflects and what it lets through are of one formula (ITU-R
-P.2040-4, eqs. 42, 43), which is Airy's sum over the waves between its faces, at the centre of the sweep. How it turns
-over the middle half of the sweep is a delay, that of the group.
+cabinet of boards, a stud wall), with inner faces at that depth. A thin closed body is one slab of its own thickness.
+All else is an opaque half space. Reflection and transmission of a slab follow from one formula (ITU-R P.2040-4, eqs.
+42, 43), Airy's sum over the waves between its faces, at the centre of the sweep. Its phase slope over the middle half
+of the sweep is a group delay.
 
 With p = exp(-j k d root), root = sqrt(eps - sin^2), a slab of half-space coefficient g has
 
     gamma = g (1 - p^2) / (1 - g^2 p^2),        tau = (1 - g^2) p / (1 - g^2 p^2).
 
-Both are worked out anew for every ray: between the faces of a door leaf of 40 mm, fringes follow one another by some
-degrees, too close for a table. And their turn over the sweep needs no unwrapping: that of p is k d Re(root), and the
+Both are computed anew for every ray: between the faces of a door leaf of 40 mm, fringes are some degrees apart, too
+close for a table. Their phase slopes over the sweep need no unwrapping: that of p is k d Re(root), and the
 brackets have positive real parts.
 
-A rough surface scatters as Lambert has it, in a lobe about the mirror direction, and in one back to the source.
-Effective roughness (Degli-Esposti, Fuschini, Vitucci, Falciasecca, IEEE TAP 55(1), 2007): of the diffuse power one
-share is scattered as Lambert has it, one into a directive lobe ((1 + cos psi_r) / 2)^alpha about the specular
-direction, one into a lobe ((1 + cos psi_i) / 2)^alpha back towards the source. The paper normalises each lobe by its
-integral over the hemisphere, which depends on the angle of incidence and so breaks reciprocity. Here the lobes multiply
-Lambert's cos(in) cos(out) instead, and are normalised at normal incidence, where that integral is largest:
+A rough surface has a Lambertian part, a lobe about the specular direction, and a lobe back to the source: effective
+roughness (Degli-Esposti, Fuschini, Vitucci, Falciasecca, IEEE TAP 55(1), 2007). Of the diffuse power one fraction is
+Lambertian, one is in a directive lobe ((1 + cos psi_r) / 2)^alpha about the specular direction, one in a lobe ((1 + cos
+psi_i) / 2)^alpha back towards the source. The paper normalises each lobe by its integral over the hemisphere, which
+depends on the angle of incidence and so breaks reciprocity. Here the lobes multiply Lambert's cos(in) cos(out) instead,
+and are normalised at normal incidence, where that integral is largest:
 
     sigma(in, out) = sigma0 cos(in) cos(out) (w + w_r ((1 + cos psi_r) / 2)^alpha + w_i ((1 + cos psi_i) / 2)^alpha),
 
-so swapping the ways in and out changes nothing, and at no angle does a surface scatter more than the share sigma0 / 4
-of the power that falls on it (at normal incidence, all of that share).
+so it is reciprocal, and at no angle does a surface scatter more than the fraction sigma0 / 4 of the power on it (at
+normal incidence, exactly that fraction).
 """
 
 from dataclasses import replace
@@ -37,18 +37,18 @@ from radarize.radar.config import RadarConfig
 from radarsim.world.materials import Material
 from radarsim.world.objects import SceneObject
 
-#: Columns of a layer: permittivity (-inf j: conductor), electric thickness k d (0: opaque half space), the exponent by
-#: which roughness weakens what it mirrors head on, the coefficient of that as in the beat signal, and the share of the
-#: amplitude that small objects before it leave (`clutter.uncovered`).
+#: Columns of a layer: permittivity (-inf j: conductor), electric thickness k d (0: opaque half space), the exponent of
+#: the loss by roughness at normal incidence, the reflection coefficient at normal incidence as in the beat signal, and
+#: the factor on the amplitude by small objects in front (`clutter.uncovered`).
 LAYER, HEAD_ON, UNCOVERED = 5, 3, 4
-#: Closed bodies up to this mean thickness (m) are one homogeneous slab: door leaves, table tops.
+#: Largest mean thickness (m) of closed bodies that are one homogeneous slab: door leaves, table tops.
 THICKEST_BODY = 0.05
-#: No lobes: Lambert's law, or an isotropic scatterer.
+#: No lobes: Lambertian, or an isotropic scatterer.
 LAMBERT = (1.0, 0.0, 0.0, 1.0)
 
 
 def as_slab(item: SceneObject) -> tuple[Material, bool]:
-    """An object's material, as thick as it acts (None: opaque), and whether the slab is the whole of a closed body."""
+    """Return a material with its effective thickness (None: opaque), and whether the slab is a whole closed body."""
     if item.material.conductor:
         return replace(item.material, thickness=None), False
     if item.mesh.is_watertight:
@@ -60,7 +60,7 @@ def as_slab(item: SceneObject) -> tuple[Material, bool]:
 
 
 def layer(material: Material, config: RadarConfig) -> Complex[np.ndarray, "5"]:
-    """What `mirror` and `window` take of a material as thick as it acts."""
+    """Columns of a layer, for `mirror` and `window`, from a material with its effective thickness."""
     frequency, wavenumber = config.center_frequency, 2 * np.pi / config.wavelength
     found = np.empty(LAYER, complex)
     found[0], found[1] = material.permittivity_at(frequency), wavenumber * (material.thickness or 0.0)
@@ -71,7 +71,7 @@ def layer(material: Material, config: RadarConfig) -> Complex[np.ndarray, "5"]:
 
 
 def covered(layers: Complex[np.ndarray, "*n 5"], left: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n 5"]:
-    """Layers of whose reflection small objects leave a share of the amplitude."""
+    """Layers whose reflection is reduced to a fraction of the amplitude by small objects in front."""
     found = layers.copy()
     found[..., HEAD_ON:] = layers[..., HEAD_ON:] * np.asarray(left)[..., None]
     return found
@@ -79,7 +79,7 @@ def covered(layers: Complex[np.ndarray, "*n 5"], left: Float[np.ndarray, "*n"] |
 
 @njit(cache=True)
 def mirror(layer, cosine):
-    """What a layer mirrors of TE and TM at a cosine of incidence, roughness included, as in the beat signal."""
+    """Reflection coefficients for TE and TM at a cosine of incidence, roughness included, as in the beat signal."""
     left = layer[UNCOVERED].real * np.exp(-layer[2].real * cosine * cosine)
     if np.isinf(layer[0].imag):
         return -left + 0j, left + 0j
@@ -93,12 +93,12 @@ def mirror(layer, cosine):
 
 @njit(cache=True)
 def window(layer, cosine, share):
-    """What a slab lets through of TE and TM, relative to the air in its place and as in the beat signal, and by how
-    much it delays the mean of both, in units of 1 / k.
+    """Transmission coefficients of a slab for TE and TM, relative to the air in its place and as in the beat signal,
+    and the delay of their mean, in units of 1 / k.
 
     Args:
-        layer, cosine: as `mirror` has them.
-        share: of the frequency, over which the delay is taken.
+        layer, cosine: see `mirror`.
+        share: fraction of the frequency over which the delay is taken.
     """
     turn, (te, tm, root) = layer[1].real, _half_space(layer[0], cosine)
     once = np.exp(-1j * turn * root)
@@ -113,14 +113,14 @@ def window(layer, cosine, share):
 
 @njit(cache=True)
 def _half_space(permittivity, cosine):
-    """Coefficients of an endless depth for TE and TM (`Material.fresnel`), and sqrt(eps - sin^2)."""
+    """Fresnel coefficients of a half space for TE and TM (`Material.fresnel`), and sqrt(eps - sin^2)."""
     root = np.sqrt(permittivity - (1 - cosine * cosine))
     return (cosine - root) / (cosine + root), (permittivity * cosine - root) / (permittivity * cosine + root), root
 
 
 def lag(material: Material, config: RadarConfig) -> float:
-    """How much later than its front face's a material's head-on echo comes, m; before it (< 0) where the waves from
-    both faces nearly cancel."""
+    """Additional delay of a material's echo at normal incidence relative to its front face, m; negative where the waves
+    from both faces nearly cancel."""
     eps, turn = layer(material, config)[:2]
     if turn == 0 or np.isinf(eps.imag):
         return 0.0
@@ -132,7 +132,7 @@ def lag(material: Material, config: RadarConfig) -> float:
 
 
 def sweep_share(config: RadarConfig) -> float:
-    """The middle half of the sweep, over which delays are taken, as a share of its centre frequency."""
+    """Middle half of the sweep, over which delays are taken, as a fraction of its centre frequency."""
     return config.bandwidth / 2 / config.center_frequency
 
 
@@ -160,10 +160,10 @@ def scattering(cos_in, cos_out, cos_between, lobe):
     """Bistatic radar cross section over sigma0 times the area.
 
     Args:
-        cos_in, cos_out: cosines of both ways with the normal, positive (1 for an isotropic scatterer).
+        cos_in, cos_out: cosines of both directions with the normal, positive (1 for an isotropic scatterer).
         cos_between: cosine of the angle between the directions to source and receiver, 1 for backscatter. The angle to
             the specular direction follows: cos psi_r = 2 cos_in cos_out - cos_between.
-        lobe: as `weights` gives it.
+        lobe: see `weights`.
     """
     shape = lobe[0]
     if lobe[1] > 0.0:

@@ -1,4 +1,4 @@
-"""The radar as seen in the mirrors in sight of one frame, in arrays, and over which of them light may reach a body."""
+"""Images of the radar in the mirrors visible in one frame, and the mirrors over which a body may be illuminated."""
 
 from typing import NamedTuple
 
@@ -11,16 +11,16 @@ from radarsim.propagation.fields import along, dot, length, minus, vec, write
 
 
 class Images(NamedTuple):
-    """The radar of one frame as seen in mirrors in sight.
+    """Images of the radar of one frame in visible mirrors.
 
     Attributes:
-        mirror: index of each.
-        image: where the radar is seen in it, m.
-        height: of the radar over it, m.
-        away: its normal on the radar's side.
+        mirror: index of each mirror.
+        image: position of the radar's image, m.
+        height: distance of the radar from the mirror's plane, m.
+        away: normal on the radar's side.
         u, v, half: of the reflector (`reflectors.Flat`).
-        foot: the image from the reflector's middle, along u and v, m.
-        forward: what `away` has of the radar's forward direction.
+        foot: position of the image relative to the reflector's centre, along u and v, m.
+        forward: component of `away` along the radar's forward direction.
     """
 
     mirror: Int[np.ndarray, "image"]
@@ -36,7 +36,7 @@ class Images(NamedTuple):
 
 @njit(cache=True)
 def images(observation, frame, flat, seen):
-    """Images of the radar of a frame in mirrors in sight (`seen`) that it does not touch."""
+    """Images of the radar of a frame in visible mirrors (`seen`) that it does not touch."""
     p, rotation, count = vec(observation.position[frame]), observation.rotation[frame], 0
     n = len(seen)
     found = Images(
@@ -67,13 +67,13 @@ def images(observation, frame, flat, seen):
 
 @njit(cache=True, error_model="numpy")
 def look(observation, images, capsule, radar, worth):
-    """Fills in over which mirrors light may reach a body (`segments.Capsule`): a quick look at all of them.
+    """Mark the mirrors over which a body (`segments.Capsule`) may be illuminated: a fast test of all of them.
 
-    It takes the bounds of `segments` on the lit part of its axis one by one, with Fresnel zones as long as they are in
+    It applies the bounds of `segments` to the lit part of the body's axis one by one, with Fresnel zones as long as in
     the plane of incidence.
 
     Args:
-        radar: where it is, m, and its forward direction.
+        radar: its position, m, and forward direction.
     """
     center, axis, half, radius = capsule
     here, forward = radar

@@ -1,6 +1,7 @@
-"""Which scatterers light may reach over mirrors: a quick look at millions of chains of mirrors and scatterers.
+"""Fast test of which scatterers may be reached over mirrors, for millions of chains of mirrors and scatterers.
 
-It leaves out what `apertures.misses` does at the last mirror, and what is too far, turned away or too weak.
+It excludes scatterers outside of the last mirror's aperture (`apertures.outside_aperture`), too far, turned away or too
+weak.
 """
 
 from typing import NamedTuple
@@ -17,9 +18,9 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.targets import Targets
 
-#: No rectangular aperture passes more than this.
+#: Largest amplitude factor of a rectangular aperture.
 MOST = SLIT**2
-#: Added to cosines at scatterers, so that single precision hides none of them; the cosine where there is no normal.
+#: Added to cosines at scatterers, so that single precision excludes none of them; the cosine where there is no normal.
 _ROUNDING, _ISOTROPIC = 1e-5, 1.0
 
 
@@ -29,7 +30,7 @@ class Trials(NamedTuple):
     Attributes:
         frame: index.
         chains: mirrors in order from the sensor on; the second one -1: there is none.
-        candidates: rows of the scatterers that each chain may lead to.
+        candidates: rows of the scatterers that each chain may reach.
         longest, weakest: bounds, by candidate, on a path's length (m) and on its amplitude times the root of the cosine
             at the scatterer (1/m).
     """
@@ -42,8 +43,8 @@ class Trials(NamedTuple):
 
 
 class Chains(NamedTuple):
-    """Mirrors, frame, and the range of aims of each chain; which of these are within reach: `lit` from a place on, in
-    eights."""
+    """Mirrors, frame, and the range of aims of each chain; those within reach are marked in `lit` from an index on,
+    padded to groups of eight."""
 
     mirrors: Int[np.ndarray, "chain 2"]
     frame: Int[np.ndarray, "chain"]
@@ -53,8 +54,8 @@ class Chains(NamedTuple):
 
 
 class Aims(NamedTuple):
-    """Candidates of all trials: where they are, their normals (`least` is added to cosines with these), and bounds as
-    `Trials` has them."""
+    """Candidates of all trials: positions, normals (`least` is added to cosines with these), and bounds as in
+    `Trials`."""
 
     candidate: Int[np.ndarray, "aim"]
     scatterer: Int[np.ndarray, "aim"]
@@ -69,7 +70,7 @@ class Aims(NamedTuple):
 def lit(
     observation: Observation, targets: Targets, candidates: Candidates, flat: Flat, trials: list[Trials]
 ) -> tuple[Chains, Aims, Int[np.ndarray, "chain"]]:
-    """All chains of some trials, their aims, and how many of these each may reach."""
+    """All chains of some trials, their aims, and the number that each may reach."""
     rows, longest, weakest = (np.concatenate(column) for column in list(zip(*trials, strict=True))[2:])
     scatterer, table = candidates.scatterer[rows], targets.scatterers
     place, normal = (
@@ -92,14 +93,14 @@ def lit(
 
 
 def from_zero(counts: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n+1"]:
-    """Where each of some ranges of places begins, and where the last one ends."""
+    """Start of each of some ranges, and the end of the last one."""
     return np.concatenate([[0], np.cumsum(counts)])
 
 
 @njit
 def image_in(p, flat, mirrors):
-    """The last of some mirrors; the sensor as seen in all but it, its image in all, and the former's height over it,
-    zero where its back is turned."""
+    """Last of some mirrors; image of the sensor in all but the last, and in all; and the height of the former over the
+    last mirror, zero if its back is turned."""
     one, two = mirrors
     last = one if two < 0 else two
     source = mirrored(p, vec(flat.center[one]), vec(flat.normal[one]))
@@ -114,7 +115,7 @@ def image_in(p, flat, mirrors):
 
 @njit(parallel=True, cache=True)
 def _reaches(observation, flat, chains, aims, count):
-    """Fills in what is lit, and how many."""
+    """Mark the aims within reach, and count them."""
     for k in prange(len(count)):
         one, two = chains.mirrors[k]
         last, _, image, h = image_in(vec(observation.position[chains.frame[k]]), flat, chains.mirrors[k])
@@ -130,7 +131,7 @@ def _reaches(observation, flat, chains, aims, count):
 
 @njit(cache=True)
 def lit_ones(lit):
-    """Which are."""
+    """Indices of the true elements of a mask of aims."""
     found, n = np.empty(len(lit), np.int64), 0
     for eight, some in enumerate(lit.view(np.uint64)):
         if some != 0:  # few are
@@ -143,10 +144,11 @@ def lit_ones(lit):
 
 @njit(cache=True, error_model="numpy")
 def _reach(image, h, most, window, zone, aims, which, lit):
-    """Which aims light may reach from an image through its mirror, at height h over the image, `most` over distance.
+    """Aims that may be reached from an image through its mirror, at height h over the image; `most`: bound over
+    distance.
 
-    A quick look in arrays of single precision: it leaves out what `misses` does, what is too far, turned away or too
-    weak; zone: square of the widest, over the part of the way, m.
+    A fast test in single precision that excludes aims outside of the aperture, too far, turned away or too weak; zone:
+    square of the widest Fresnel zone, over the part of the path, m.
     """
     begin, end = which
     f = np.float32

@@ -1,9 +1,9 @@
-"""Plates that move, such as leaves of doors: they reflect, mirror and let through as the same plates at rest.
+"""Moving plates, such as leaves of doors: they reflect, mirror and transmit like the same plates at rest.
 
-Each is a scene of its own, in whose frame it stands. Its faces join the flat reflectors of every frame where it is in
-the middle of the burst, and rays that it is in the way of are traced in its own frame. Over the burst it moves on by a
-rigid motion G, which takes what it mirrors along: an image of the receiver by a plate's part, M, becomes G M G^-1, and
-one by several mirrors the product of theirs.
+Each plate is a scene of its own, at rest in its own frame. Its faces join the flat reflectors of every frame at their
+position at the centre of the burst, and rays that it may obstruct are traced in its own frame. During the burst it
+moves by a rigid motion G together with its images: an image of the receiver in a part of the plate, M, becomes G M
+G^-1, and one over several mirrors the product of theirs.
 """
 
 from dataclasses import replace
@@ -21,12 +21,12 @@ from radarsim.world.scene import Scene
 
 
 class MovingPlates:
-    """All of a scene's movers.
+    """All moving plates of a scene.
 
     Args:
         moving: the movers.
         config: radar configuration.
-        margin: rays start and end this far from their ends, m.
+        margin: distance from both ends at which rays start and end, m.
     """
 
     def __init__(self, moving: MovingTargets, config: RadarConfig, margin: float):
@@ -45,13 +45,13 @@ class MovingPlates:
         self, times: Float[np.ndarray, "n"]
     ) -> tuple[Float[np.ndarray, "n plate 3 3"], Float[np.ndarray, "n plate 3"]]:
         """Rotations and centres of the plates at some times, s."""
-        # one instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other
+        # one time after another: sums over many at once have another order, and a frame must not depend on others
         poses = [self._moving.poses(np.array([t])) for t in times]
         turn, center = (np.concatenate(parts) for parts in zip(*poses, strict=True))
         return turn[:, self._part], center[:, self._part]
 
     def faces(self, observation: Observation) -> tuple[Flat, Flat]:
-        """Their faces in every frame, and the inner faces of hollow ones."""
+        """Faces of the plates in every frame, and the inner faces of hollow ones."""
         outer, inner = [Flat.zeros(0)], [Flat.zeros(0)]
         for frame, (turns, centers) in enumerate(zip(*self._places(observation.time), strict=True)):
             for plate, (turn, center, own) in enumerate(zip(turns, centers, self._reflectors, strict=True)):
@@ -60,9 +60,9 @@ class MovingPlates:
         return Flat.joined(outer), Flat.joined(inner)
 
     def moves(self, observation: Observation) -> Float[np.ndarray, "frame plate 4 3 4"]:
-        """How they move from the middle of each burst on: to where they are at its three nodes, and in the middle.
+        """Rigid motions from the centre of each burst to its three nodes, and to the centre itself.
 
-        One more plate, the last, is what stands still.
+        One more plate, the last, represents what is at rest.
         """
         out = np.tile(np.eye(3, 4), (observation.frames, len(self) + 1, 4, 1, 1))
         for frame, time in enumerate(observation.time if len(self) else ()):
@@ -76,7 +76,7 @@ class MovingPlates:
         self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],
     ) -> tuple[Complex[np.ndarray, "ray"], Float[np.ndarray, "ray"]]:  # fmt: skip
-        """What they leave of waves between points, and by how much they delay it, as `Obstacles.passage` has it."""
+        """Factor on the amplitude of waves between points, and delay; see `Obstacles.passage`."""
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
         turns, centers = self._places(observation.time)
         for plate, (part, own) in enumerate(zip(self._part, self._transmission, strict=True)):
@@ -94,7 +94,7 @@ class MovingPlates:
 
 
 def _placed(flat: Flat, turn: Float[np.ndarray, "3 3"], center: Float[np.ndarray, "3"], plate: int, frame: int) -> Flat:
-    """Faces of a plate as they stand in a frame."""
+    """Faces of a plate at its position in a frame."""
     n = len(flat)
     return replace(
         flat, corners=flat.corners @ turn.T + center, center=flat.center @ turn.T + center,

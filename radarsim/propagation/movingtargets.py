@@ -1,10 +1,11 @@
-"""The movers of a scene as the radar meets them: scatterers that are carried along, and parts that stand in the way.
+"""Moving targets of a scene: scatterers carried by rigid parts, which also obstruct other paths.
 
-Over a burst a scatterer's path is a parabola through three nodes. Limbs jerk: against every chirp's own place a
-walker's echoes are wrong by -40 to -60 dB for most of the step cycle and by -25 dB where shins turn (measured over
-one). Ghosts of movers go over one mirror or out and back over one each; path segments over two are left out.
+Over a burst a scatterer's path length is a parabola through three nodes. Limbs accelerate strongly: compared with exact
+positions in every chirp, a walker's echoes have an error of -40 to -60 dB for most of the step cycle and of -25 dB
+where shins swing (measured over one cycle). Ghosts of movers have at most one mirror out and one back; paths over two
+are left out.
 
-Parts of a material scatter as its surfaces do, and are plates besides (`movingplates`).
+Parts with a material scatter like surfaces of it, and are plates besides (`movingplates`).
 """
 
 from dataclasses import replace
@@ -20,16 +21,16 @@ from radarsim.world.movers import Mover, poses
 
 
 class MovingTargets:
-    """All movers of a scene: their scatterers at any time, and what they hide.
+    """All moving targets of a scene: their scatterers at any time, and occlusion by them.
 
     Args:
-        movers: of the scene.
-        rng: draws places and phases of scatterers, once.
+        movers: movers of the scene.
+        rng: random generator of the scatterers' positions and phases.
         density: scatterers per square metre of surface.
 
     Attributes:
         parts: rigid parts of all movers.
-        opaque: indices of those that nothing passes.
+        opaque: indices of opaque parts.
         part: (scatterer,) index of the part that carries it.
         sigma: (scatterer,) radar cross sections, m^2.
     """
@@ -44,7 +45,8 @@ class MovingTargets:
             area = sum(each.area for each in parts)
             for each in parts:
                 if each.material is None:
-                    # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
+                    # Half of an upright round body faces the radar, and the mean of Lambert's squared cosine there is
+                    # 1/2.
                     per_area = 4 * getattr(mover, "cross_section", 0.0) / area
                 else:
                     per_area = each.material.sigma0
@@ -70,12 +72,12 @@ class MovingTargets:
         return poses(self.movers, t)
 
     def positions(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n scatterer 3"]:
-        """Places of the scatterers at times t (s), m."""
+        """Positions of the scatterers at times t (s), m."""
         turn, center = self.poses(t)
         return np.einsum("nsij,sj->nsi", turn[:, self.part], self._own.position) + center[:, self.part]
 
     def scatterers(self, t: float) -> Scatterers:
-        """The scatterers as they are at time t, s."""
+        """Scatterers at time t, s."""
         now = np.array([t])
         normal = np.einsum("sij,sj->si", self.poses(now)[0][0, self.part], self._own.normal)
         return replace(self._own, position=self.positions(now)[0], normal=normal)
@@ -84,7 +86,8 @@ class MovingTargets:
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float | Float[np.ndarray, "n"],
         margin: float = 0.01, parts: Int[np.ndarray, "some"] | None = None,
     ) -> Bool[np.ndarray, "n"]:  # fmt: skip
-        """Whether a part, of some or of all, stands in a segment at its time t, s; ends shortened by `margin`, m."""
+        """Whether a part, of some or of all, obstructs a segment at its time t, s; ends are shortened by `margin`,
+        m."""
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
         hidden, some = np.zeros(len(origins), bool), np.arange(len(self.parts)) if parts is None else parts
         if not len(some):
@@ -99,7 +102,7 @@ class MovingTargets:
 
 @njit(parallel=True, cache=True)
 def _hidden(origins, targets, turn, center, half, capsule, margin):
-    """Whether segments, shortened at both ends, are anywhere inside a part."""
+    """Whether segments, shortened at both ends, intersect a part."""
     hidden = np.zeros(len(origins), np.bool_)
     for i in prange(len(origins)):
         way = targets[i] - origins[i]

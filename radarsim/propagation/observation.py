@@ -1,4 +1,4 @@
-"""What is looked for, and from where: the poses of frames that are simulated together, and which echoes count."""
+"""Observation: poses of the frames that are simulated together, and limits on the echoes to find."""
 
 from typing import NamedTuple
 
@@ -7,14 +7,14 @@ from jaxtyping import Float
 
 
 class Observation(NamedTuple):
-    """Poses in the middle of each burst, and limits.
+    """Poses at the centre of each burst, and limits.
 
     Attributes:
         position, rotation, time: m, sensor to world, s.
-        range: half the longest path, m.
+        range: half the length of the longest path, m.
         wavelength: m.
         threshold: echoes below this amplitude are left out.
-        azimuth_gain, elevation_gain, peak_gain: the antenna's (`antenna.GainPattern`).
+        azimuth_gain, elevation_gain, peak_gain: gain of the antenna (`antenna.GainPattern`).
     """
 
     position: Float[np.ndarray, "frame 3"]
@@ -29,5 +29,5 @@ class Observation(NamedTuple):
 
     @property
     def frames(self) -> int:
-        """How many."""
+        """Number of frames."""
         return len(self.position)

@@ -1,4 +1,4 @@
-"""What stands in the way of rays: opaque objects and movers stop them, slabs and doors weaken and delay them."""
+"""Obstacles on rays: opaque objects and movers block them, slabs and doors attenuate and delay them."""
 
 from dataclasses import dataclass
 
@@ -13,19 +13,19 @@ from radarsim.propagation.table import Table
 from radarsim.propagation.transmission import Transmission
 from radarsim.world.scene import Scene
 
-#: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
+#: Distance of visibility rays from both of their ends, m: surfaces do not obstruct themselves.
 CLEARANCE = 5e-3
 
 
 @dataclass(frozen=True)
 class Passage(Table):
-    """What is left of waves on their way.
+    """Effect of obstacles on waves.
 
     Attributes:
-        factor: on the amplitude; 0 where something opaque stands in the way.
-        delay: by slabs, m.
-        through: whether slabs are passed.
-        blocked: share of the amplitude that opaque objects keep out.
+        factor: factor on the amplitude; 0 behind an opaque object.
+        delay: delay by slabs, m.
+        through: whether a slab is passed.
+        blocked: fraction of the amplitude that opaque objects block.
     """
 
     factor: Complex[np.ndarray, "way"]
@@ -34,20 +34,20 @@ class Passage(Table):
     blocked: Float[np.ndarray, "way"]
 
     def after_one_another(self, first: Int[np.ndarray, "whole"]) -> "Passage":
-        """Of whole ways, each from its first row to before the next one's."""
+        """Combine consecutive rows to whole paths, each from its first row to before the next one's."""
         factor, delay = np.multiply.reduceat(self.factor, first), np.add.reduceat(self.delay, first)
         clear = np.multiply.reduceat(1 - self.blocked, first)
         return Passage(factor, delay, np.logical_or.reduceat(self.through, first), 1 - clear)
 
 
 class Obstacles:
-    """The world as seen by a ray.
+    """Obstacles of a scene.
 
     Args:
-        scene: None where nothing can stand in the way.
-        transmission: what passes through its thin objects.
-        moving: what moves by itself.
-        plates: those of its parts that waves may pass.
+        scene: geometry; None: there are no obstacles.
+        transmission: its thin objects.
+        moving: moving objects.
+        plates: moving plates that transmit waves.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Obstacles:
 
     @classmethod
     def of(cls, scene: Scene | None, moving: MovingTargets, config: RadarConfig) -> "Obstacles":
-        """All that there is in a place for a radar."""
+        """Obstacles of a scene for a radar's configuration."""
         transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
         return cls(scene, transmission, moving, MovingPlates(moving, config, CLEARANCE))
 
@@ -65,11 +65,11 @@ class Obstacles:
         self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"], through: Bool[np.ndarray, "ray"] | None = None,
     ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
-        """Whether nothing is in the way; frames and ends as `passage` has them.
+        """Whether rays are unobstructed; frames and ends as for `passage`.
 
         Args:
-            observation, frame, begin, end: of `passage`.
-            through: rays that slabs of the scene do not count for; None: they count for all.
+            observation, frame, begin, end: see `passage`.
+            through: rays for which slabs of the scene are no obstacles; None: they are obstacles for all.
         """
         blocked = np.zeros(len(frame), bool) if self.scene is None else self.scene.occluded(begin, end, CLEARANCE)
         if through is not None and self.transmission is not None and self.transmission.opaque is not None:
@@ -84,19 +84,19 @@ class Obstacles:
         self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],
     ) -> Passage:  # fmt: skip
-        """What is left of waves between points.
+        """Factor and delay of waves between points.
 
         Args:
-            observation, frame: which rays are for which frame.
+            observation, frame: frame of each ray.
             begin, end: m.
-            allowed: slabs are looked for in the way of these, and are opaque to the others.
+            allowed: rays through slabs that are evaluated; for the others slabs are opaque.
         """
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
         if self.scene is not None and self.transmission is not None and len(frame):
             blocked = self.scene.occluded(begin, end, margin=CLEARANCE)
             factor[blocked] = 0
             through, opaque = np.flatnonzero(blocked & allowed), self.transmission.opaque
-            if opaque is not None:  # one test costs a tenth of counting slabs
+            if opaque is not None:  # this test takes a tenth of the time of counting slabs
                 through = through[~opaque.occluded(begin[through], end[through], margin=CLEARANCE)]
             if len(through):
                 up = observation.rotation[frame[through], :, 2]
@@ -110,16 +110,16 @@ class Obstacles:
 
     def way(
         self, observation: Observation, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],
-        stretches: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
+        segments: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
     ) -> Passage:  # fmt: skip
-        """The same for ways of several stretches from the sensor over stops.
+        """The same for paths of several segments from the sensor over stops.
 
         Args:
-            stops: m; the last of a way may be followed by others that do not count.
-            stretches: how many of each way's stops count.
+            stops: m; unused stops may follow the last one of a path.
+            segments: number of segments of each path.
         """
-        first = np.cumsum(stretches) - stretches
-        way = np.repeat(np.arange(len(stretches)), stretches)
+        first = np.cumsum(segments) - segments
+        way = np.repeat(np.arange(len(segments)), segments)
         stop = np.arange(len(way)) - first[way]
         end = stops[way, stop]
         begin = np.roll(end, 1, axis=0)

@@ -1,8 +1,8 @@
-"""One-way paths between sensor and scatterer, straight and over one or two mirrors.
+"""One-way paths between sensor and scatterer, direct and over one or two mirrors.
 
 A one-way path over mirrors is a straight line to the scatterer's virtual point, its image in the mirrors. Its amplitude
-holds the antenna's gain, the mirrors' reflection coefficients with polarisation and apertures, the slabs it passes, and
-1 / length.
+includes the antenna's gain, the mirrors' reflection coefficients with polarisation and apertures, slabs, and 1 /
+length.
 """
 
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from numba import njit, prange
 
-from radarsim.propagation.apertures import aperture, misses, passes
+from radarsim.propagation.apertures import aperture, aperture_diffraction, outside_aperture
 from radarsim.propagation.candidates import Candidates
 from radarsim.propagation.fields import (
     along,
@@ -42,11 +42,11 @@ class OneWay(Table):
     """One-way paths of a batch.
 
     Attributes:
-        candidate: row in the table of candidates: which scatterer in which frame.
+        candidate: row in the table of candidates, for scatterer and frame.
         mirrors: in order from the sensor on, as indices of flat reflectors; -1: none.
-        amplitude: see above, 1/m; phase as in the beat signal.
-        virtual: the scatterer as seen through the mirrors, m.
-        last: the last point before the scatterer: the sensor's, or a place of reflection, m.
+        amplitude: one-way amplitude, 1/m; phase as in the beat signal.
+        virtual: image of the scatterer in the mirrors, m.
+        last: last point before the scatterer: the sensor, or a point of reflection, m.
         through: whether it passes a slab.
     """
 
@@ -66,7 +66,7 @@ class OneWay(Table):
     def straight(
         cls, observation: Observation, targets: Targets, candidates: Candidates, rows: Int[np.ndarray, "path"]
     ) -> "OneWay":
-        """Straight paths to some candidates, not yet tested for what is in the way."""
+        """Direct paths to some candidates, before visibility tests."""
         n = len(rows)
         return cls(
             rows, np.full((n, 2), -1), candidates.straight[rows].astype(complex),
@@ -78,10 +78,10 @@ class OneWay(Table):
 def over_mirrors(
     observation: Observation, targets: Targets, candidates: Candidates, flat: Flat, trials: list[Trials]
 ) -> tuple[OneWay, Float[np.ndarray, "path 3 3"]]:
-    """The paths over one mirror and over two that there are, not yet tested for what is in the way.
+    """Find the paths over one mirror and over two, before visibility tests.
 
     Returns:
-        the paths, and the places of reflection on each in order, followed by the scatterer's (up to three), m.
+        The paths, and the points of reflection of each in order, followed by the scatterer (up to three), m.
     """
     chains, aims, count = lit(observation, targets, candidates, flat, trials)
     slots = from_zero(count)
@@ -93,14 +93,14 @@ def over_mirrors(
 
 @njit(parallel=True, cache=True)
 def _paths(observation, flat, chains, aims, scatterers, slots, found, stops):
-    """Fills in the paths over every chain."""
+    """Write the paths over every chain."""
     for k in prange(len(chains.frame)):
         _over(observation, flat, chains, k, aims, scatterers, (slots, found, stops))
 
 
 @njit(cache=True)
 def _over(observation, flat, chains, k, aims, scatterers, out):
-    """Fills in the paths over one chain, from its slot on."""
+    """Write the paths over one chain, from its slot on."""
     slots, found, stops = out
     frame = chains.frame[k]
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
@@ -116,7 +116,7 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
         way = minus(s, image)
         full = length(way)
         hs = dot(minus(s, cl), nl)
-        part = h / (h + hs)  # of the way at which the last mirror lies
+        part = h / (h + hs)  # position of the last mirror as a fraction of the path
         stop = along(image, part, way)
         way = (way[0] / full, way[1] / full, way[2] / full)
         square = 0.5 * observation.wavelength * full * part * (1 - part)
@@ -129,7 +129,7 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
             part *= share
             bounce, earlier = along(source, share, earlier), unit(earlier)
             wide = 0.5 * observation.wavelength * full * part * (1 - part)
-            if misses(bounce, earlier, wide, before):
+            if outside_aperture(bounce, earlier, wide, before):
                 continue
         j = aims.scatterer[i]
         cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
@@ -143,9 +143,9 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
         te, tm = mirror(flat.layer[last], min(abs(dot(way, nl)), 1.0))
         if most * size * max(abs(te), abs(tm)) <= least:
             continue
-        passed = passes(stop, way, square, window)
+        passed = aperture_diffraction(stop, way, square, window)
         if two >= 0:
-            passed *= passes(bounce, earlier, wide, before)
+            passed *= aperture_diffraction(bounce, earlier, wide, before)
         if abs(passed) * size <= least:
             continue
         now = unit(leaving)

@@ -1,21 +1,21 @@
-"""The coherent echo of smooth curved surfaces: geometric optics at specular points, Fresnel's integral up to borders.
+"""Coherent echo of smooth curved surfaces: geometric optics at specular points, Fresnel's integral up to borders.
 
-Where the way from the radar over a surface and back is stationary, physical optics is the wall's echo times what the
-way's Hessians have in common (Deschamps, Proc. IEEE 60(9), 1972), with the principal radii a_1 and a_2 there
+Where the path from the radar over a surface and back is stationary, physical optics is the wall's echo times a factor
+from the path's Hessians (Deschamps, Proc. IEEE 60(9), 1972), with the principal radii a_1 and a_2 there
 
     lambda / (8 pi h) / sqrt((1 + h / a_1) (1 + h / a_2)),
 
-far away sigma = pi a_1 a_2; beyond a caustic, where a factor is negative, its root turns by -90 deg. Borders cut the
-integral: with coordinates y in which the way's phase is pi |y|^2 / 2, it is (`apertures`)
+far away sigma = pi a_1 a_2; beyond a caustic, where a factor is negative, its root has a phase of -90 deg. Borders
+truncate the integral: with coordinates y in which the path's phase is pi |y|^2 / 2, it is (`apertures`)
 
     F = (1 / 2j) int exp(j pi |y|^2 / 2) dA = inside - (1 / 2 pi) closed int exp(j pi |y|^2 / 2) dphi.
 
-Both hold where the specular point has left the piece: then it lies on the quadric that goes on beyond the border, and F
-fades. At a caustic the first factor grows as y shrinks, so an echo is never more than that of its piece if all of it
-were in phase: energy is kept without a bound of its own. Where the Hessian has both signs, F is taken with |y|^2 of
-both alike, which is right at its middle, at a straight border and for small pieces.
+Both hold if the specular point has left the piece: then it lies on the quadric that continues beyond the border, and F
+fades. At a caustic the first factor grows as y shrinks, so an echo is at most that of its piece with uniform
+phase: energy is conserved without a separate bound. Where the Hessian has both signs, F is taken with |y|^2 of equal
+signs, which is exact in the middle, at a straight border and for small pieces.
 
-Each piece has one specular point, which is what like curvatures make of it: its normals are all different.
+Each piece has one specular point, because pieces have curvatures of one sign: their normals are all different.
 """
 
 from typing import NamedTuple
@@ -32,10 +32,10 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.smooth import Piece
 from radarsim.propagation.table import filled
 
-#: About so many of a piece's corners are where the search for its specular point may begin, and so many triangles, at
-#: most, are from there to the one that holds it.
+#: Number of a piece's corners from which the search for its specular point may start, and largest number of triangles
+#: between the start and the triangle with the specular point.
 STARTS, STEPS = 64, 512
-#: Square of an angle between normals, rad^2, that is nothing where no border is near.
+#: Square of an angle between normals, rad^2, regarded as zero where no border is near.
 BESIDE = 1e-4
 
 
@@ -43,12 +43,12 @@ class Patches(NamedTuple):
     """Pieces of smooth surfaces.
 
     Attributes:
-        mesh: all of them as one; corners and triangles are numbered through.
-        home: a triangle that a corner is of.
-        begin: first corner, triangle and side of each piece, and of none.
+        mesh: all pieces as one mesh; corners and triangles are numbered consecutively.
+        home: a triangle of each corner.
+        begin: first corner, triangle and side of each piece, and the end of the last.
         ball: centre and radius of a sphere around each, m.
-        two_sided: sheets show both sides.
-        layer: as of flat reflectors (`reflectors.Flat`).
+        two_sided: sheets reflect on both sides.
+        layer: see flat reflectors (`reflectors.Flat`).
     """
 
     mesh: Piece
@@ -60,7 +60,7 @@ class Patches(NamedTuple):
 
     @classmethod
     def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "5"]]]) -> "Patches":
-        """All of some pieces, each with whether it shows both sides and how it reflects."""
+        """Build the table of pieces, each with whether it is two-sided and its layer."""
         pieces = [row[0] for row in rows]
         begin = np.cumsum([(0, 0, 0), *((len(p.place), len(p.faces), len(p.border)) for p in pieces)], axis=0)
         place, corners = np.zeros((0, 3)), np.zeros((0, 3), int)
@@ -83,7 +83,7 @@ class Patches(NamedTuple):
 
 
 def specular_points(observation: Observation, frame: int, patches: Patches) -> SpecularPoints:
-    """Those of all pieces above the threshold in one frame."""
+    """Specular points of all pieces above the threshold in one frame."""
     return filled(
         SpecularPoints,
         lambda found: _specular_points(observation, frame, patches, found.columns),
@@ -93,7 +93,7 @@ def specular_points(observation: Observation, frame: int, patches: Patches) -> S
 
 @njit(cache=True)
 def _specular_points(observation, frame, patches, found):
-    """Returns how many there are, of which as many as fit are written."""
+    """Return the number of specular points, of which as many as fit are written."""
     p, rotation, count = vec(observation.position[frame]), observation.rotation[frame], 0
     for k in range(len(patches.ball)):
         if length(minus(vec(patches.ball[k]), p)) - patches.ball[k, 3] > observation.range:
@@ -119,16 +119,16 @@ def _specular_points(observation, frame, patches, found):
 
 @njit(cache=True)
 def strength(observation, patches, of, one, two):
-    """The echo of one side of a piece between two places.
+    """Echo of one side of a piece between two places.
 
     Args:
         observation: range and wavelength.
-        patches, of: the pieces; which one, and 1.0 for the side of its normals, -1.0 for the other.
+        patches, of: the pieces; index of one, and 1.0 for the side of its normals, -1.0 for the other.
         one, two: m.
 
     Returns:
-        a point for rays to aim at, m; the surface there (`curved.stationary`); the specular point, m; and the amplitude
-        that an isotropic antenna gets from one place to the other.
+        End point of the visibility ray, m; the surface there (`curved.stationary`); the specular point, m; and the
+            amplitude from one place to the other for an isotropic antenna.
     """
     k, turn = of
     face, weights, inside = _foot(patches, k, turn, one, two)
@@ -166,8 +166,8 @@ def _scaled(scale, a):
 
 @njit
 def _principal(tensor, one, two):
-    """The principal values, the larger one first, of a symmetric tensor (11, 22, 12) over two directions at right
-    angles, each with its direction."""
+    """Principal values, the larger one first, of a symmetric tensor (11, 22, 12) over two orthogonal directions, and
+    their directions."""
     mean, half = (tensor[0] + tensor[1]) / 2, (tensor[0] - tensor[1]) / 2
     apart, angle = np.hypot(half, tensor[2]), 0.5 * np.arctan2(tensor[2], half)
     c, s = np.cos(angle), np.sin(angle)
@@ -176,15 +176,15 @@ def _principal(tensor, one, two):
 
 @njit
 def _off(mesh, corner, turn, one, two):
-    """How the direction that halves the angle differs from the normal at a corner."""
+    """Difference between the direction that bisects the angle and the normal at a corner."""
     place, normal = vec(mesh.place[corner]), vec(mesh.normal[corner])
     return along(unit(along(unit(minus(one, place)), 1.0, unit(minus(two, place)))), -turn, normal)
 
 
 @njit(cache=True)
 def _foot(patches, k, turn, one, two):
-    """The triangle of a piece, and the weights of its corners, where the normal best halves the angle, and whether it
-    does: from the best of some corners on, across sides."""
+    """Triangle of a piece and weights of its corners where the normal best bisects the angle, and whether it does: a
+    search from the best of some corners, across sides."""
     mesh, nearest, best, begin, end = patches.mesh, 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
     for corner in range(begin, end, (end - begin) // STARTS + 1):
         off = _off(mesh, corner, turn, one, two)
@@ -197,7 +197,7 @@ def _foot(patches, k, turn, one, two):
         if off < least:
             least, weights, holds = off, others, face
         low, to = 0.0, -1
-        for corner in range(3):  # across the side beyond which it is, most of all
+        for corner in range(3):  # across the side beyond which it lies, the farthest first
             if shares[corner] < low and mesh.across[face, corner] >= 0:
                 low, to = shares[corner], mesh.across[face, corner]
         circles = to >= 0 and (to == came or step == STEPS - 1)
@@ -214,14 +214,14 @@ def _foot(patches, k, turn, one, two):
 
 @njit(cache=True)
 def _nearest(mesh, face, turn, one, two):
-    """Where on a triangle the normal best halves the angle: the square of what it is off; weights of corners; and those
-    where it would halve it if the triangle went on for ever."""
+    """Point of a triangle whose normal best bisects the angle: the square of the deviation; weights of the corners; and
+    the weights if the triangle extended without limit."""
     a, b, c = mesh.faces[face]
     m = unit(along(along(vec(mesh.normal[a]), 1.0, vec(mesh.normal[b])), 1.0, vec(mesh.normal[c])))
     wa, wb, wc = (
         _off(mesh, a, turn, one, two), _off(mesh, b, turn, one, two), _off(mesh, c, turn, one, two)
     )  # fmt: skip
-    seen = dot(wa, m) * turn > -1  # from behind, it is halved as well
+    seen = dot(wa, m) * turn > -1  # the angle is bisected from behind as well
     wa, wb, wc = along(wa, -dot(wa, m), m), along(wb, -dot(wb, m), m), along(wc, -dot(wc, m), m)
     ka, kb, kc = dot(cross(wb, wc), m), dot(cross(wc, wa), m), dot(cross(wa, wb), m)
     total = ka + kb + kc
@@ -241,7 +241,7 @@ def _nearest(mesh, face, turn, one, two):
 
 @njit
 def _on_side(one, two):
-    """The square of the least vector between two, and its share of the way from one to the other."""
+    """Square of the shortest vector between two, and its fraction of the way from one to the other."""
     way = minus(two, one)
     t = min(max(-dot(one, way) / (dot(way, way) + 1e-30), 0.0), 1.0)
     off = along(one, t, way)
@@ -250,7 +250,7 @@ def _on_side(one, two):
 
 @njit(cache=True)
 def _surface(mesh, face, turn, weights):
-    """A point of a triangle for rays to aim at, m, and the surface there, as `curved.stationary` takes it.
+    """Point of a triangle as the end of visibility rays, m, and the surface there, see `curved.stationary`.
 
     The surface lies over the triangle as an arc lies over its chord: by (q - p_i) . n_i / (1 + n_i . n) from each
     corner, which any quadric has to second order and a circle half way precisely.
@@ -281,11 +281,11 @@ def _surface(mesh, face, turn, weights):
 
 @njit(cache=True)
 def _fresnel(patches, of, zones, way):
-    """What the borders of a piece leave of its echo.
+    """Factor on a piece's echo by the diffraction of its borders.
 
     Args:
         patches, of: see `strength`.
-        zones: the specular point, m; axes in which places about it are Fresnel units, 1/m; whether the way is shortest
+        zones: the specular point, m; axes in which places about it are Fresnel units, 1/m; whether the path is shortest
             or longest there; and whether it is inside, where no border is near.
         way: from where, to where, how long, and the wavelength, m.
     """
@@ -323,7 +323,7 @@ def _hidden(mesh, corner, turn, way):
 
 @njit
 def _units(place, zones, way):
-    """Fresnel units from the specular point: the direction as over its quadric, as far as the way is longer."""
+    """Offset from the specular point in Fresnel units: direction on its quadric, length by path difference."""
     middle, first, second, elliptic, _ = zones
     one, two, least, wavelength = way
     offset = minus(place, middle)

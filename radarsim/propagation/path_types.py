@@ -1,13 +1,13 @@
-"""The type of a path, as a user of the radar means it: an echo of what is really there, or a ghost.
+"""Type of a path: an echo of a real surface, or a ghost, as the radar's resolution allows to distinguish.
 
-A ghost is an echo whose apparent place is farther from every surface that is really there than the radar can resolve.
-The apparent place is where the radar puts the echo: at half the path's length, at the peak of the antenna row's beam
-pattern, at the path's mean elevation. The cell that the radar cannot resolve is a range bin deep either way, as wide as
-the row's half-power beam, and as high as the element's; a floor or ceiling fills it only within a range bin. So a
-corner of two walls is no ghost, nor is the image of a thing in the wall that it touches.
+A ghost is an echo whose apparent place is farther from every real surface than the radar can resolve.
+The apparent place is where the radar locates the echo: at half the path's length, at the peak of the antenna row's beam
+pattern, at the path's mean elevation. The resolution cell extends a range bin in either direction, is as wide as
+the row's half-power beam, and as high as the element's; for a floor or ceiling it extends only a range bin. So a
+corner of two walls is no ghost, nor is the image of an object in the wall that it touches.
 
-How a path came about stands in its own columns (`paths.Paths`: bounces, through, blocked, moving), so that any other
-definition can be made from them.
+The origin of a path is in its own columns (`paths.Paths`: bounces, through, blocked, moving), so that other
+definitions are possible.
 """
 
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ from radarsim.propagation.antenna import GainPattern
 from radarsim.propagation.paths import Paths
 from radarsim.world.scene import Scene
 
-#: Beams over which the peak is looked for, sines of azimuth.
+#: Beams in which the peak is searched, sines of azimuth.
 BEAMS = np.linspace(-0.95, 0.95, 96)
-#: Apparent places are rounded to so many steps a range bin, and to sines of elevation of this step: many paths, those
-#: out and back in either order among them, then share a place.
+#: Number of steps per range bin, and step of the sine of elevation, to which apparent places are rounded, so that many
+#: paths, such as the two directions of a ghost, share a place.
 STEPS, RISE = 4, 1 / 64
-#: Probes of a cell, in halves of its extent: lateral position, or all of it, radial, upward; first those that meet a
-#: surface most often.
+#: Probes of a cell, in halves of its extent: lateral position or extent, radial, vertical; those that meet a surface
+#: most often come first.
 _ALL = None
 _PROBES = (
     (_ALL, 0, 0), (0, _ALL, 0),
@@ -41,21 +41,21 @@ _PROBES = (
 
 
 class PathType(IntEnum):
-    """Of several that fit, the last but for a ghost through a slab, which is a ghost."""
+    """If several types apply, the last one, except for a ghost through a slab, which is a ghost."""
 
-    DIRECT = 0  #: corners of mirrors, too: they echo from where they stand
+    DIRECT = 0  #: includes corners of mirrors, whose echo comes from where they are
     FLOOR_CEILING = 1
-    THROUGH_SLAB = 2  #: of something behind a wall, pane or door
+    THROUGH_SLAB = 2  #: target behind a wall, pane or door
     GHOST = 3
-    MOVING = 4  #: something on the way moves
+    MOVING = 4  #: something on the path moves
 
 
 @dataclass(frozen=True, eq=False)
 class PathTypes:
-    """Tells paths apart by what a radar can resolve.
+    """Classifier of paths by the radar's resolution.
 
     Attributes:
-        scene: whose surfaces are really there; None: there are none.
+        scene: scene with the real surfaces; None: there are none.
         config, pattern: of the radar.
     """
 
@@ -73,8 +73,8 @@ class PathTypes:
         """Type of each path of some frames.
 
         Args:
-            paths, lengths: of each frame, and how long they are in the middle of the burst, m.
-            positions, rotations: of the sensor then, m, sensor to world.
+            paths, lengths: paths of each frame, and their lengths at the centre of the burst, m.
+            positions, rotations: sensor poses at that time, m, sensor to world.
         """
         found, mirrored, cells = [], [], []
         for some, length, position, rotation in zip(paths, lengths, positions, rotations, strict=True):
@@ -99,7 +99,7 @@ class PathTypes:
 
     @cached_property
     def _row(self) -> tuple[Int[np.ndarray, "antenna"], Float[np.ndarray, "antenna"]]:
-        """The antenna row, and how far to the left its antennas are, m."""
+        """Antenna row, and positions of its antennas to the left, m."""
         row = azimuth_row(self.config)
         return row, virtual_positions(self.config).reshape(-1, 3)[row, 1]
 
@@ -112,7 +112,7 @@ class PathTypes:
         self, paths: Paths, lengths: Float[np.ndarray, "path virtual"], position: Float[np.ndarray, "3"],
         rotation: Float[np.ndarray, "3 3"],
     ) -> Float[np.ndarray, "path 3"]:  # fmt: skip
-        """Where the radar puts paths of one frame, m; arguments as for a call."""
+        """Apparent places of the paths of one frame, m; arguments as for a call."""
         n = len(paths)
         cells = self._cells(paths, lengths, position, rotation)
         return self._places(cells, np.broadcast_to(position, (n, 3)), np.broadcast_to(rotation, (n, 3, 3)))
@@ -121,7 +121,7 @@ class PathTypes:
         self, paths: Paths, lengths: Float[np.ndarray, "path virtual"], position: Float[np.ndarray, "3"],
         rotation: Float[np.ndarray, "3 3"],
     ) -> Int[np.ndarray, "path 3"]:  # fmt: skip
-        """The same as numbers of the step in range, the beam, and the step in elevation from straight down."""
+        """The same as indices of the range step, the beam, and the elevation step from straight down."""
         cells, way = np.empty((len(paths), 3), np.int64), paths.apparent(position) - position
         rise = way @ rotation[:, 2] / np.maximum(np.linalg.norm(way, axis=2), 1e-9)
         cells[:, 2] = np.rint((rise.mean(axis=1) + 1) / RISE)
@@ -133,7 +133,7 @@ class PathTypes:
         self, cells: Int[np.ndarray, "cell 3"], positions: Float[np.ndarray, "cell 3"],
         rotations: Float[np.ndarray, "cell 3 3"],
     ) -> Float[np.ndarray, "cell 3"]:  # fmt: skip
-        """Middles of cells, m."""
+        """Centres of cells, m."""
         range_ = self.config.range_resolution / STEPS * cells[:, 0]
         rise = np.clip(RISE * cells[:, 2] - 1, -0.999, 0.999)
         most = np.sqrt(1 - rise**2)
@@ -144,7 +144,7 @@ class PathTypes:
     def _near_surface(
         self, places: Float[np.ndarray, "place 3"], positions: Float[np.ndarray, "place 3"]
     ) -> Bool[np.ndarray, "place"]:
-        """Whether a surface passes through the cells about some places."""
+        """Whether a surface passes through the resolution cell at some places."""
         real = np.zeros(len(places), bool)
         if self.scene is None or not len(places):
             return real
@@ -163,14 +163,14 @@ class PathTypes:
         return real
 
     def _extents(self, away: Float[np.ndarray, "place 3"]) -> Float[np.ndarray, "place 3 3"]:
-        """Half the extent of cells so far away from the radar: lateral, radial and upward, levelled, m."""
+        """Half extents of cells at given offsets from the radar: lateral, radial and vertical, levelled, m."""
         range_ = np.linalg.norm(away, axis=1)
         radial = away / range_[:, None]
         lateral = np.stack([-radial[:, 1], radial[:, 0], np.zeros(len(away))], axis=1)
         lateral /= np.maximum(np.linalg.norm(lateral, axis=1, keepdims=True), 1e-9)
         left = self._row[1]
         aperture = np.ptp(left) * len(left) / max(len(left) - 1, 1)
-        # half-power half width of a uniform row, sine; one antenna tells no directions apart
+        # half-power half width of a uniform row, sine; one antenna has no angular resolution
         beam = 0.443 * self.config.wavelength / aperture if aperture > 0 else 1.0
         strong = self.pattern.elevation_gain > self.pattern.elevation_gain[0] / np.sqrt(2)
         rise = np.tan(np.deg2rad(0.5 * np.argmin(strong)) if not strong.all() else np.pi / 4)
@@ -182,7 +182,7 @@ class PathTypes:
 
 @njit(cache=True)
 def _ends(places, extents, rows, probe, ends):
-    """Both ends of a probe of some cells, which it is given in halves of their extent."""
+    """Both ends of a probe of some cells, given in halves of their extent."""
     for k in range(2):
         for i, row in enumerate(rows):
             for d in range(3):
@@ -193,7 +193,7 @@ def _ends(places, extents, rows, probe, ends):
 
 @njit(cache=True, fastmath=True)
 def _beams(lengths, row, wavelength, step, steering, cells):
-    """Writes the step in range and the beam in which a row of antennas sees each path strongest."""
+    """Write the range step and the beam with the strongest response of a row of antennas to each path."""
     antennas, beams = steering.shape
     real, imaginary = steering.real.copy(), steering.imag.copy()
     re, im = np.empty(beams, np.float32), np.empty(beams, np.float32)

@@ -1,14 +1,14 @@
-"""The table of propagation paths: geometry, amplitude, and what each path met on its way.
+"""Table of propagation paths: geometry, amplitude, and interactions on the way.
 
-A path's length is known for every antenna and instant; its amplitude and visibility are taken once per frame, in the
-middle of the burst. Three kinds of geometry give the length from a transmit antenna at tx to a receive antenna at rx:
+A path's length is known for every antenna and time; its amplitude and visibility are evaluated once per frame, at the
+centre of the burst. Three kinds of geometry give the length from a transmit antenna at tx to a receive antenna at rx:
 
-    POINT    |tx - a| + |b - rx|: the target as seen through the mirrors of the way out (a) and of the way back (b)
+    POINT    |tx - a| + |b - rx|: the target's images in the mirrors of the path out (a) and of the path back (b)
     IMAGE    |tx - M rx|: an isometry M of the receiver: the reflection in a plate, a half turn about its edge, an
              inversion in its corner (together the physical-optics integral over a plate), or a chain of mirrors
-    CURVED   the shortest path over a curved surface (`curved.path_over`), and a delay by slabs
+    CURVED   the shortest path over a curved surface (`curved.path_over`), plus a delay by slabs
 
-What moves has its geometry at the three nodes of the burst (`burst.NODES`) as well: its track.
+Moving targets have their geometry at the three nodes of the burst (`burst.NODES`) as well: their track.
 """
 
 from dataclasses import dataclass, field, replace
@@ -31,15 +31,15 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Passage
 from radarsim.propagation.table import Table
 
-#: Numbers that describe a path's geometry: a and b; matrix | offset by rows; a curved surface's
-#: (`curved.SpecularPoints`) and a delay, m.
+#: Numbers of a path's geometry: a and b; matrix | offset by rows; those of a curved surface (`curved.SpecularPoints`)
+#: and a delay, m.
 GEOMETRY = SHAPE + 1
-#: Mirrors on a path at most: two out and two back, or a chain of three.
+#: Largest number of mirrors on a path: two out and two back, or a chain of three.
 MIRRORS = 4
 
 
 class Kind(IntEnum):
-    """How a path's length follows from its geometry."""
+    """Kind of geometry that determines a path's length."""
 
     POINT = 0
     IMAGE = 1
@@ -52,19 +52,19 @@ class Paths(Table):
 
     Attributes:
         frame: index within the batch.
-        kind: a `Kind` each.
-        geometry: of that kind, world, m, in the middle of the burst.
+        kind: a `Kind`.
+        geometry: geometry of that kind, world frame, m, at the centre of the burst.
         amplitude: square root of received over transmitted power, with phase, as in the beat signal.
-        bounces: mirrors on the way; the surface, body or plate that echoes is none.
+        bounces: number of mirrors on the path; the surface, body or plate that echoes does not count.
         through: whether it passes a slab: a wall, a pane, a door.
-        blocked: share of the amplitude that opaque objects keep out.
+        blocked: fraction of the amplitude that opaque objects block.
         level: whether a floor or ceiling echoes.
-        moving: whether anything on the way moves.
-        mirrors: on the way, in order, as indices of the batch's flat reflectors: of a `POINT` two out and two back, of
-            an `IMAGE` the plate that it is a part of, or the chain; -1: none.
+        moving: whether anything on the path moves.
+        mirrors: mirrors on the path, in order, as indices of the batch's flat reflectors: of a `POINT` two out and two
+            back, of an `IMAGE` the plate that it is a part of, or the chain; -1: none.
         scatterer: index in the batch; -1: none.
-        track: row of `tracks`; -1: it stands still.
-        tracks: geometry at the burst's nodes of what moves.
+        track: row of `tracks`; -1: no motion.
+        tracks: geometry of moving paths at the burst's nodes.
     """
 
     frame: Int[np.ndarray, "path"]
@@ -88,12 +88,12 @@ class Paths(Table):
         cls, kind: Kind, geometry: Float[np.ndarray, "path *shape"], amplitude: Complex[np.ndarray, "path"],
         **columns: ArrayLike,
     ) -> Self:  # fmt: skip
-        """Paths of one kind; columns that are not given are zero, indices -1.
+        """Build paths of one kind; columns that are not given are zero, indices -1.
 
         Args:
-            kind: of all of them.
+            kind: kind of all paths.
             geometry: (path, 2, 3) of points, (path, 3, 4) of images, (path, 13) or (path, 14) of curved surfaces.
-            amplitude: with phase.
+            amplitude: amplitude with phase.
             columns: others, arrays or one value for all.
         """
         found, size = replace(cls.zeros(len(amplitude)), amplitude=amplitude), int(np.prod(geometry.shape[1:]))
@@ -103,7 +103,7 @@ class Paths(Table):
         return found
 
     def where(self, **columns: object) -> Self:
-        """Rows that have some values: ``paths.where(bounces=1, moving=False)``."""
+        """Select rows by values of columns: ``paths.where(bounces=1, moving=False)``."""
         rows = np.ones(len(self), bool)
         for name, value in columns.items():
             rows &= getattr(self, name) == value
@@ -111,22 +111,22 @@ class Paths(Table):
 
     @property
     def points(self) -> Float[np.ndarray, "point 2 3"]:
-        """a and b of those that are points, m."""
+        """a and b of the paths with point geometry, m."""
         return self.geometry[self.kind == Kind.POINT, :6].reshape(-1, 2, 3)
 
     @property
     def images(self) -> Float[np.ndarray, "image 3 4"]:
-        """Isometries of those that are images."""
+        """Isometries of the paths with image geometry."""
         return self.geometry[self.kind == Kind.IMAGE, :12].reshape(-1, 3, 4)
 
     def apparent(self, position: Float[np.ndarray, "3"]) -> Float[np.ndarray, "path 2 3"]:
-        """Where the target seems to be, for the wave that leaves and for the wave that returns.
+        """Apparent places of the target, for the outgoing and for the returning wave.
 
         Args:
-            position: of the sensor, m.
+            position: position of the sensor, m.
 
         Returns:
-            places, m; the mean of both distances from the sensor is half the path's length.
+            Places, m; the mean of their distances from the sensor is half the path's length.
         """
         places = self.geometry[:, :6].reshape(-1, 2, 3).copy()
         rows = self.kind == Kind.IMAGE
@@ -138,7 +138,7 @@ class Paths(Table):
         return places
 
     def behind(self, observation: Observation, passed: Passage) -> Self:
-        """What is left of paths of which this much passes obstacles; delays move images and curved paths away."""
+        """Apply the effect of obstacles; delays shift images and curved paths away."""
         amplitude = self.amplitude * passed.factor
         kept = np.abs(amplitude) > observation.threshold
         paths, passed = self[kept], passed[kept]
@@ -157,11 +157,11 @@ class Paths(Table):
 
         Args:
             config: radar configuration.
-            motion: has position(t) and rotation(t) of the sensor.
-            time: the frame's stamp, s.
+            motion: motion of the sensor, with position(t) and rotation(t).
+            time: time stamp of the frame, s.
 
         Returns:
-            parabolas in the burst's normalised time (`burst`), m.
+            Parabolas in the burst's normalised time (`burst`), m.
         """
         times = time + BurstClock.of(config).nodes
         return self.lengths_from(motion.position(times), motion.rotation(times).as_matrix(), config)

@@ -1,4 +1,4 @@
-"""The coherent echo of flat convex polygons: physical optics, from near field to far field, on and off the normal.
+"""Coherent echo of flat convex polygons: physical optics, in near and far field, on and off the normal.
 
 The physical-optics integral of a plate under a point source at height h over its plane,
 
@@ -15,9 +15,9 @@ X = sqrt(8 (rho - L) / lambda), it is exactly
 
     h^2 s sqrt(lambda / 2) / (2 pi) int exp(j pi X^2 / 2) / (rho (rho^2 - h^2) sqrt(rho + L)) dX,
 
-which splits into the edge's own echo, from the point of its line nearest the radar, where that lies on the edge, and
-one from either end. Every part has its own exact path length |tx - M rx|: the mirror image in the plane, half turns
-about edges, inversions in corners. So Doppler, angle and range of edges and corners come out right, and parts of
+which splits into the edge's own echo, from the point of its line nearest to the radar if that is on the edge, and one
+from either end. Every part has its own exact path length |tx - M rx|: the mirror image in the plane, half turns
+about edges, inversions in corners. So Doppler, angle and range of edges and corners are correct, and parts of
 adjoining coplanar plates cancel along their seam.
 """
 
@@ -31,9 +31,9 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import filled
 
-#: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
+#: Shift of the foot inwards, m: on a seam it is inside both plates, whose parts add up.
 NUDGE = 1e-8
-#: Nodes and weights of the quadrature along an edge, on 0 ... 1: for most, and for where the pole is near.
+#: Nodes and weights of the quadrature along an edge, on 0 ... 1: for most edges, and for those near the pole.
 _FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) / 2 for n in (8, 28))
 
 
@@ -44,7 +44,7 @@ def specular_points(flat: Flat, observation: Observation, frame: int) -> Specula
 
 @njit(cache=True)
 def _specular_points(flat, observation, frame, found):
-    """Returns how many there are, of which as many as fit are written."""
+    """Return the number of specular points, of which as many as fit are written."""
     corners, zero = flat.corners, (0.0, 0.0, 0.0)
     p, rotation, reach = vec(observation.position[frame]), observation.rotation[frame], observation.range
     wavelength, weakest = observation.wavelength, observation.threshold
@@ -86,7 +86,7 @@ def _specular_points(flat, observation, frame, found):
             low = dot(minus(one, foot), side)
             high = low + size
             slant = np.hypot(h, s)
-            # Ends of the edge: worth a thought if the leading term, far from the specular point, is.
+            # Ends of the edge: evaluated if the leading term, far from the specular point, is significant.
             for end, x, sign in ((k, low, 1.0), ((k + 1) % sides, high, -1.0)):
                 rho = np.hypot(slant, x)
                 if rho >= reach:
@@ -126,11 +126,11 @@ def _specular_points(flat, observation, frame, found):
 
 @njit
 def _add(found, count, facet, amplitude, aim, image):
-    """Write a part if there is room; returns how many there are.
+    """Write a part if there is room; return the number of parts.
 
     Args:
-        found, count: parts so far.
-        facet, amplitude, aim: of `SpecularPoints`.
+        found, count: parts so far, and their number.
+        facet, amplitude, aim: see `SpecularPoints`.
         image: the isometry s (1 - 2 a a' - 2 b b') about a point: a reflection in a plane of normal a (b zero), a half
             turn about an edge at right angles to a and b, an inversion in a corner (s = -1, both zero).
     """
@@ -150,9 +150,9 @@ def _add(found, count, facet, amplitude, aim, image):
 
 @njit(cache=True)
 def _beyond(h, s, slant, x, wavelength):
-    """The integral along an edge's line from x >= 0 on, phase referred to the path by its begin.
+    """Integral along an edge's line from x >= 0 on, phase relative to the path over its start.
 
-    From X the way turns by 45 deg into the complex plane, where exp(j pi X^2 / 2) decays; steps grow with the distance
+    The contour leaves X at 45 deg into the complex plane, where exp(j pi X^2 / 2) decays; steps grow with the distance
     from the pole X = +-j S at rho = h.
     """
     near = np.sqrt(slant * slant + x * x)

@@ -1,4 +1,4 @@
-"""What reflects like a mirror: the flat parts of a scene, each with its aperture, and its round bodies."""
+"""Specular reflectors of a scene: flat parts with their apertures, round bodies, and smooth curved pieces."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,19 +23,19 @@ from radarsim.world.scene import Scene
 
 @dataclass(frozen=True)
 class Flat(Table):
-    """Flat convex quadrilaterals, and in each a rectangle that stands for it where it mirrors scatterers.
+    """Flat convex quadrilaterals, each with a rectangle that represents it as a mirror of scatterers.
 
     Attributes:
-        corners: in order around, m; of a triangle two fall together.
+        corners: in order around, m; two coincide for a triangle.
         center, normal, u, v: m and unit vectors; u, v lie along the rectangle's sides.
         half: half the rectangle's side lengths along u and v, m.
-        two_sided: sheets without a volume show both sides.
+        two_sided: sheets without a volume reflect on both sides.
         horizontal: part of a floor or ceiling.
-        layer: what they are made of (`media.layer`), and how much of it small objects leave uncovered.
-        lag: how much later than its face the head-on echo comes, m (`media.lag`).
-        finish: how uneven they are over plaster, see `unevenness.FINISHES`.
-        plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
-            -1: they stand still, in all frames.
+        layer: layer of the material (`media.layer`), and the fraction left uncovered by small objects.
+        lag: additional delay of the echo at normal incidence, m (`media.lag`).
+        finish: unevenness relative to plaster, see `unevenness.FINISHES`.
+        plate, frame: moving plate that they belong to (`movingplates`), and the frame of that position; -1: at rest, in
+            all frames.
     """
 
     corners: Float[np.ndarray, "facet 4 3"]
@@ -53,20 +53,20 @@ class Flat(Table):
     frame: Int[np.ndarray, "facet"]
 
     def present(self, frame: int) -> Bool[np.ndarray, "facet"]:
-        """Which are there in a frame."""
+        """Mask of the reflectors that exist in a frame."""
         return (self.frame < 0) | (self.frame == frame)
 
 
 @dataclass(frozen=True)
 class Reflectors:
-    """All of a scene.
+    """All specular reflectors of a scene.
 
     Attributes:
         flat: quadrilaterals that cover its flat regions.
-        round: its spheres and cylinders.
-        smooth: pieces of its other curved surfaces.
-        inner: the inner faces of hollow bodies, seen through outer ones: they reflect, but mirror nothing else.
-        heights: how uneven the flat ones are; None: not at all.
+        round: spheres and cylinders.
+        smooth: pieces of other curved surfaces.
+        inner: inner faces of hollow bodies, visible through outer ones: they reflect, but are not used as mirrors.
+        heights: unevenness of the flat ones; None: none.
     """
 
     flat: Flat
@@ -80,23 +80,23 @@ class Reflectors:
         return [(some, Grid(some.corners.min(axis=1), some.corners.max(axis=1))) for some in (self.flat, self.inner)]
 
     def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> list[Flat]:
-        """Flat ones, and inner faces, within a distance (m) of any of the positions, in the same order."""
+        """Flat reflectors, and inner faces, within a distance (m) of any of the positions, in constant order."""
         return [some[grid.near(positions, distance)[0]] for some, grid in self._grids]
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
-        """The reflectors of a scene."""
+        """Build the reflectors of a scene."""
         flat, inner, bodies, smooth, rest = [], [], [], [], []
         tables: dict[Material, tuple[np.ndarray, float]] = {}
         left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
-        smallest = config.wavelength**2  # physical optics holds down to about a wavelength
+        smallest = config.wavelength**2  # physical optics is valid down to about a wavelength
         for number, item in enumerate(scene.objects):
             slab, _ = as_slab(item)
             if slab not in tables:
                 tables[slab] = layer(slab, config), lag(slab, config)
             round_, is_round = recognise(item.mesh)
             curved, is_curved = pieces(item.mesh, ~is_round, smallest)
-            # a body has one table, and nowhere more energy than falls on it
+            # a body has one table, so that it scatters at most the power that falls on it
             least = left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0)
             bent = covered(tables[slab][0], float(least))
             bodies += [(b.center, b.axis, b.radius, b.half, bent) for b in round_]
@@ -104,7 +104,7 @@ class Reflectors:
             rest.append((item.mesh, ~(is_round | is_curved)))
         for item, found in zip(scene.objects, plates_of_each(rest, smallest), strict=True):
             slab, whole = as_slab(item)
-            deep = None if whole or item.two_sided else slab.thickness  # of the wall of a hollow body, m
+            deep = None if whole or item.two_sided else slab.thickness  # wall thickness of a hollow body, m
             finish = FINISHES.get(item.material.name, 0.0)
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))

@@ -1,20 +1,20 @@
-"""Waves that are scattered from surface to surface before they come back: the diffuse multipath of rooms.
+"""Diffuse multipath of rooms: waves that are scattered from surface to surface before they return to the radar.
 
-Behind its walls a room goes on echoing, for some metres of range: power that structure and small objects scatter falls
+A room continues to echo for some metres of range beyond its walls: power scattered by structure and small objects falls
 on others, and some of it returns (Andersen, Nielsen, Pedersen, Bauch, Herdin, "Room electromagnetics", IEEE Antennas
-and Propagation Magazine 49(2), 2007). Here it is a random walk of waves, as in acoustics and in radiosity. A walk
-begins at a place on a surface, drawn with a density in proportion to the share of power that is scattered there (its
-albedo). It leaves as Lambert has it. At each surface the wave is scattered, mirrored, let through or lost by chance,
-each with its share of power. Every place at which it may be scattered ends a detour: the radar's wave falls on one end,
-and is scattered back from the other. With A, the area that a walk stands for at its beginning, albedos rho, and the
-antenna's gains G, the power of a detour one way round is
+and Propagation Magazine 49(2), 2007). The model is a random walk of waves, as in acoustics and in radiosity. A walk
+begins at a place on a surface, drawn with a density proportional to the fraction of power that is scattered there (its
+albedo), in a direction with a Lambertian distribution. At each surface the wave is scattered, reflected, transmitted or
+absorbed at random with the probability of the corresponding power fraction. Every place of scattering ends a detour:
+the radar's wave is incident on one end, and returns from the other. With A, the area represented by a walk at its
+start, albedos rho, and the antenna's gains G, the power of a detour in one direction is
 
     P / P_t = lambda^2 / (16 pi^3)  A rho_begin rho_end  (G cos / r^2)_begin  (G cos / r^2)_end,
 
-half of it in the receiver's polarisation: scattering twice leaves none. It can be gone either way round, and both ways
-are equally long, so they add as amplitudes (coherent backscattering, twice the power).
+half of it in the receiver's polarisation, because two scatterings depolarise. Both directions of a detour have the
+same length, so their amplitudes add (coherent backscattering, twice the power).
 
-The walks are fixed in the world, so their echoes are coherent under motion like any other's.
+The walks are fixed in the world, so their echoes are coherent under motion like all others.
 """
 
 from dataclasses import dataclass
@@ -32,23 +32,23 @@ from radarsim.propagation.table import Table
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import areas, scattered
 
-#: Walks that begin on a square metre that scatters all that falls on it; walks of a scene at most.
+#: Number of walks per square metre of albedo 1; largest number in a scene.
 DENSITY, MOST = 40.0, 1_000_000
-#: Surfaces on which a walk is followed.
+#: Largest number of surfaces of a walk.
 STEPS = 6
-# m^2: nearer than the area that a walk stands for is wide, the radar sees a part of it
+# m^2: at a distance below the width of the area represented by a walk, the radar sees only a part of it
 _NEAR = 1 / (np.pi * DENSITY)
 
 
 @dataclass(frozen=True)
 class Detours(Table):
-    """Walks of waves between two places at which they are scattered.
+    """Paths of waves between two places of scattering.
 
     Attributes:
-        begin, end: places, m.
-        begin_normal, end_normal: of the surfaces there, outward.
+        begin, end: positions, m.
+        begin_normal, end_normal: outward normals of the surfaces there.
         between: length of the walk, m.
-        weight: area that the beginning stands for times both albedos, m^2.
+        weight: area represented by the start times both albedos, m^2.
         phase: rad, random.
     """
 
@@ -62,12 +62,12 @@ class Detours(Table):
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig, rng: np.random.Generator) -> "Detours":
-        """Those of a scene; without clutter there are none.
+        """Draw the detours of a scene; without clutter there are none.
 
         Args:
             scene: the world.
-            config: gives the frequency at which surfaces reflect.
-            rng: draws them.
+            config: radar configuration; its frequency determines reflection.
+            rng: random generator.
         """
         surfaces = Albedos(scene, config)
         corners, normals, albedo = scene.triangles, scene.normals, surfaces.albedo
@@ -104,10 +104,10 @@ class Detours(Table):
 
 
 class Albedos:
-    """What the triangles of a scene do with the power that falls on them.
+    """Fractions of the incident power that the triangles of a scene scatter, reflect and transmit.
 
     Attributes:
-        albedo: share that structure and small objects scatter, of each triangle.
+        albedo: fraction scattered by structure and small objects, for each triangle.
         two_sided: whether a triangle scatters on both sides.
     """
 
@@ -121,7 +121,7 @@ class Albedos:
         self.albedo = 1 - uncovered(scene, scene.triangles.mean(axis=1), scene.normals)
 
     def shares(self, triangle: Int[np.ndarray, "n"], cosine: Float[np.ndarray, "n"]) -> Float[np.ndarray, "2 n"]:
-        """Shares of power that triangles mirror and let through at cosines of incidence, of both polarisations."""
+        """Power fractions reflected and transmitted by triangles at cosines of incidence, of both polarisations."""
         found = np.empty((2, len(triangle)))
         _shares(self._layers, self._layer[triangle], cosine, self._sweep, found)
         return found * (1 - self.albedo[triangle])
@@ -139,8 +139,8 @@ def _shares(layers, which, cosine, sweep, found):
 
 
 def _lambert(normal: Float[np.ndarray, "n 3"], rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
-    """Directions about normals with a density in proportion to the cosine (Malley): to a point of the unit sphere that
-    touches the surface."""
+    """Random directions about normals with a density proportional to the cosine (Malley): to a point of the unit sphere
+    that touches the surface."""
     ball = rng.standard_normal((len(normal), 3))
     way = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
     return way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
@@ -149,10 +149,10 @@ def _lambert(normal: Float[np.ndarray, "n 3"], rng: np.random.Generator) -> Floa
 def echoes(
     observation: Observation, detours: Detours
 ) -> tuple[Int[np.ndarray, "echo"], Int[np.ndarray, "echo"], Float[np.ndarray, "echo"]]:
-    """Which detours may echo in which frame; rays to their ends are not yet tested.
+    """Select detours that may echo in each frame, before visibility tests of their ends.
 
     Returns:
-        frame, detour, and amplitude either way round (square root of received over transmitted power).
+        Frame, detour, and amplitude in either direction (square root of received over transmitted power).
     """
     count = np.zeros(observation.frames, np.int64)
     index = np.empty((observation.frames, len(detours)), np.int32)

@@ -1,7 +1,7 @@
-"""World-anchored point scatterers: what stands for the diffuse echo of every surface.
+"""Point scatterers fixed in the world, which represent the diffuse echo of every surface.
 
-Each has its place, normal, cross section and random phase in the world. So speckle is a property of the world: it stays
-coherent while the sensor moves over it, as on a real wall. `Surface` draws those of a scene.
+Each has a position, normal, cross section and random phase in the world, so speckle is coherent while the sensor
+moves, as on a real wall. `Surface` generates those of a scene.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from radarsim.propagation.media import LAMBERT
 from radarsim.propagation.table import Table
 
-#: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
+#: Every n-th scatterer of a sampled surface has paths over mirrors, and every n-th of those over two mirrors.
 BOUNCE_STRIDE = 4
 
 
@@ -24,7 +24,7 @@ class Scatterers(Table):
     Attributes:
         position: m.
         normal: unit outward normal, or zero for an isotropic scatterer.
-        sigma: sigma0 times the area it stands for, m^2; an isotropic scatterer's radar cross section.
+        sigma: sigma0 times the area represented, m^2; radar cross section of an isotropic scatterer.
         phase: rad, uniformly random.
         two_sided: whether it scatters from behind as well (sheets without a volume).
         horizontal: whether it belongs to a floor or ceiling.
@@ -32,7 +32,7 @@ class Scatterers(Table):
             every fourth scatterer has them, with four times the power.
         bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
         lobe: its scattering pattern, see `media.weights`.
-        rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
+        rank: 0...1, determines up to which distance it is used, see `detail`; negative: at any distance.
     """
 
     position: Float[np.ndarray, "scatterer 3"]
@@ -48,7 +48,7 @@ class Scatterers(Table):
 
     @classmethod
     def points(cls, position: ArrayLike, sigma: ArrayLike, phase: Float[np.ndarray, "n"] | None = None) -> "Scatterers":
-        """Isotropic scatterers at (n, 3) or (3,) places, m, of given cross sections, m^2."""
+        """Isotropic scatterers at (n, 3) or (3,) positions, m, with given cross sections, m^2."""
         position = np.atleast_2d(np.asarray(position, float))
         n, one = len(position), np.ones(len(position))
         return replace(
@@ -57,5 +57,5 @@ class Scatterers(Table):
         )  # fmt: skip
 
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Scatterers":
-        """All of them: a given set is taken as it is, a `Surface` draws what is needed."""
+        """All scatterers: a given set is used as it is, a `Surface` generates those in reach."""
         return self

@@ -1,7 +1,7 @@
-"""Path segments between the radar and a curved body, straight or over a mirror, and which pairs of them make an echo.
+"""Path segments between the radar and a curved body, direct or over a mirror, and pairs of them that may make an echo.
 
-A ghost goes out on one segment and back on another. Of tens of thousands of pairs nearly none is worth a look, so each
-segment has bounds: the part of the body's axis that the mirror's aperture shows the radar, and what it passes at most.
+A ghost has one segment out and another back. Of tens of thousands of pairs hardly any is significant, so each
+segment has bounds: the part of the body's axis visible in the mirror's aperture, and the largest amplitude it passes.
 """
 
 from typing import NamedTuple
@@ -14,18 +14,18 @@ from radarsim.propagation.apertures import SLIT, STRIP_FAR
 from radarsim.propagation.fields import along, dot, gain_towards, length, minus, mirrored, unit, vec, write
 from radarsim.propagation.mirror_images import look
 
-#: m: the point at which rays aim lies at least so far within the lit part of an axis.
+#: m: smallest distance of the end point of visibility rays from the ends of the lit part of an axis.
 INSIDE = 0.01
-#: A body is thin from so many radii away, and so short that the gain hardly changes along it.
+#: Distance in radii from which a body is thin, and length relative to distance below which the gain is nearly constant.
 _THIN, _SHORT = 20.0, 0.3
-#: The ends of a cylinder are felt at most so many Fresnel units away.
+#: Largest distance, in Fresnel units, at which the ends of a cylinder have an effect.
 _ZONES = 1.2 * STRIP_FAR
-#: What the gain may change along a short one, and what all that is left out may add to an amplitude.
+#: Factor for changes of the gain along a short body, and for all neglected effects on an amplitude.
 _GAIN, _SAFE = 1.3, 2.0
 
 
 class Capsule(NamedTuple):
-    """What holds a curved body: middle, axis, half length and radius, m."""
+    """Bounding cylinder of a curved body: centre, axis, half length and radius, m."""
 
     center: tuple[float, float, float]
     axis: tuple[float, float, float]
@@ -34,16 +34,16 @@ class Capsule(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Segments to a body; as many rows as there are mirrors in sight, and one.
+    """Segments to a body; one row per visible mirror, plus one for the direct segment.
 
     Attributes:
-        mirror: its index; -1: straight.
-        image: the radar as seen in the mirror, m.
-        span: the part of the axis, from its middle, to which it leads at most, m.
-        place: of the image, from the body's middle along its axis, and away from the axis, m.
+        mirror: index of the mirror; -1: direct.
+        image: image of the radar in the mirror, m.
+        span: largest part of the axis, relative to its centre, that the segment reaches, m.
+        place: position of the image relative to the body's centre along its axis, and distance from the axis, m.
         aside: unit vector from the axis to the image.
-        ends: of what the mirror does not cut off of the axis: the lower end at least and at most, and the upper one, m.
-        most: gain times what the aperture passes, at most.
+        ends: limits of the part of the axis in front of the mirror: smallest and largest lower end, and upper end, m.
+        most: upper bound of gain times aperture factor.
     """
 
     mirror: Int[np.ndarray, "segment"]
@@ -57,7 +57,7 @@ class Segments(NamedTuple):
 
 @njit
 def empty_segments(count):
-    """Segments for `fill`."""
+    """Allocate segments for `fill`."""
     return Segments(
         np.empty(count, np.int64), np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2)),
         np.empty((count, 3)), np.empty((count, 4)), np.empty(count),
@@ -66,8 +66,8 @@ def empty_segments(count):
 
 @njit(cache=True)
 def fill(observation, frame, flat, images, capsule, segments):
-    """Fill in the segments of a frame that may lead to a body, the straight one first, over mirrors in sight; return
-    how many there are, 0 if the body is out of range."""
+    """Write the segments of a frame that may reach a body, the direct one first, then over visible mirrors; return
+    their number, 0 if the body is out of range."""
     center, axis, half, radius = capsule
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
     forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
@@ -89,7 +89,7 @@ def fill(observation, frame, flat, images, capsule, segments):
         if span[0] > span[1]:
             continue
         _write(segments, count, m, image, capsule, span)
-        around = radius * np.sqrt(max(1 - rise * rise, 0.0))  # a line on the body is at most so much nearer
+        around = radius * np.sqrt(max(1 - rise * rise, 0.0))  # largest distance of a line on the body towards the image
         segments.ends[count] = -half, -half, half, half
         for end in range(2):
             low, high = clip((-half, half), -level, -rise, (1 - 2 * end) * around)
@@ -118,13 +118,13 @@ def _write(segments, k, mirror, image, capsule, span):
 
 @njit
 def _span(observation, flat, m, radar, capsule, ahead):
-    """The part of an axis, with all within a radius of it, to which a mirror passes light that the radar sends forward.
+    """Part of an axis, with everything within a radius, that a mirror illuminates with waves sent forward by the radar.
 
-    A place at z is before the mirror by L + R z, so light to it meets the mirror at the share H / (H + L + R z) of the
-    way from the image: where that lies is linear in z over the same denominator.
+    A point at z is in front of the mirror by L + R z, so a wave to it meets the mirror at the fraction
+    H / (H + L + R z) of the path from the image: this position is linear in z over the same denominator.
 
     Args:
-        radar: its image, how far it is from the mirror (H), and L and R.
+        radar: its image, distance of the image from the mirror (H), and L and R.
         ahead: forward direction of the radar, and its part along the mirror's normal.
     """
     (image, height, level, rise), (center, axis, half, radius), (forward, off) = radar, capsule, ahead
@@ -132,9 +132,9 @@ def _span(observation, flat, m, radar, capsule, ahead):
     foot, way = minus(image, vec(flat.center[m])), minus(center, image)
     farthest, nearest = level + half * abs(rise) + radius, max(level - half * abs(rise) - radius, 0.0)
     longest = length(way) + half + radius
-    share = min(farthest / (height + farthest), 0.5)  # of the way that lies beyond the mirror, at most
+    share = min(farthest / (height + farthest), 0.5)  # largest fraction of the path beyond the mirror
     zone = STRIP_FAR * np.sqrt(0.5 * observation.wavelength * longest * share * (1 - share))
-    # It is longer in the plane of incidence, by how directions differ from the one to the middle (`apertures.passes`).
+    # It is longer in the plane of incidence, by how directions differ from that to the middle (`aperture_diffraction`).
     far, cosine = length(way), (height + nearest) / longest
     turned, spread = abs(dot(way, vec(flat.u[m]))) / far, (half + radius) / max(far - half - radius, 1e-9)
     zones = (
@@ -155,7 +155,7 @@ def _span(observation, flat, m, radar, capsule, ahead):
 
 @njit
 def clip(span, begin, slope, slack):
-    """The part of a span where begin + slope z <= slack."""
+    """Part of a span where begin + slope z <= slack."""
     low, high = span
     if abs(slope) < 1e-9:
         return span if begin <= slack else (1.0, 0.0)
@@ -165,7 +165,7 @@ def clip(span, begin, slope, slack):
 
 @njit
 def _passed(observation, flat, m, radar, capsule, place):
-    """What a mirror's aperture passes at most: a slit that is narrow in Fresnel units passes its width / sqrt(2)."""
+    """Upper bound of a mirror's aperture factor: a slit that is narrow in Fresnel units passes its width / sqrt(2)."""
     height, level, rise = radar
     farthest = level + capsule.half * abs(rise) + capsule.radius
     nearest = level - capsule.half * abs(rise) - capsule.radius
@@ -179,7 +179,7 @@ def _passed(observation, flat, m, radar, capsule, place):
 
 @njit
 def _gain(observation, frame, p, mirror, span, capsule):
-    """Gain towards a part of an axis seen in a mirror (place, normal), at most."""
+    """Upper bound of the gain towards a part of an axis seen in a mirror (place, normal)."""
     center, axis, _, _ = capsule
     low, high = span
     middle = mirrored(along(center, (low + high) / 2, axis), mirror[0], mirror[1])
@@ -195,10 +195,11 @@ def _gain(observation, frame, p, mirror, span, capsule):
 
 @njit
 def matched(observation, capsule, segments, i, j):
-    """Whether a body may echo on two segments: a part of it is lit on both, its specular point is near there, and the
-    echo is not below the threshold whatever its ends take.
+    """Whether a body may echo over two segments: a part of it is lit on both, its specular point is near there, and the
+    echo is not below the threshold whatever the effect of its ends.
 
-    The path grows by C over a plane and by C + B over a body of that radius: it spreads by at most 1 / (1 + B / C).
+    The path's second derivative is C over a plane and C + B over a body of that radius: the spreading factor is at most
+    1 / (1 + B / C).
     """
     half, radius = capsule.half, capsule.radius
     low, high = max(segments.span[i, 0], segments.span[j, 0]), min(segments.span[i, 1], segments.span[j, 1])
@@ -228,6 +229,7 @@ def matched(observation, capsule, segments, i, j):
 
 @njit
 def aim(z, low, high):
-    """Where on a lit part of an axis rays aim at whose specular point is at z; grows with all three."""
+    """End point of visibility rays on the lit part of an axis with the specular point at z; increases with all
+    three."""
     middle = (low + high) / 2
     return min(max(z, min(low + INSIDE, middle)), max(high - INSIDE, middle))

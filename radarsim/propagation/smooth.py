@@ -1,14 +1,14 @@
-"""Smooth curved pieces of a mesh, with the normals and curvatures of the surface that its triangles stand for.
+"""Smooth curved pieces of a mesh, with normals and curvatures of the surface that its triangles approximate.
 
-A tessellated surface is known at its corners. Its normals there follow from the edges: chords of a circle leave one end
-at the angle at which they arrive at the other, (n_a + n_b) . (b - a) = 0, which cylinders and spheres of any
-tessellation fulfil, and other smooth surfaces to third order. These equations of all edges are solved by least squares
-next to the means of triangles' normals after Max (J. Graphics Tools 4(2), 1999), so that they hold at borders, too. How
-normals turn over a triangle is its curvature. Where corners are off by more than rounding, in scans, each is first
-moved onto a cubic through its neighbours (osculating jets, Cazals, Pouget, CAGD 22(2), 2005).
+A tessellated surface is exact at its corners. Its normals there follow from the edges: chords of a circle leave one end
+at the angle at which they arrive at the other, (n_a + n_b) . (b - a) = 0, which holds exactly for cylinders and spheres
+of any tessellation, and for other smooth surfaces to third order. These equations of all edges are solved by least
+squares together with the means of triangles' normals after Max (J. Graphics Tools 4(2), 1999), so that they hold at
+borders, too. The change of the normals over a triangle is its curvature. Noisy corners, as in scans, are first moved
+onto a cubic through their neighbours (osculating jets, Cazals, Pouget, CAGD 22(2), 2005).
 
-Triangles that hardly bend stay flat. A piece ends at creases, and where curvature jumps: where a pipe goes over into
-its rounded end there is an end of the pipe and one of the rounding, which cancel but for what physical optics leaves.
+Triangles that hardly bend stay flat. A piece ends at creases, and where curvature is discontinuous: where a pipe joins
+its rounded end, the end of the pipe and that of the rounding cancel except for the residual of physical optics.
 """
 
 from typing import NamedTuple
@@ -22,33 +22,33 @@ from scipy.spatial import cKDTree
 
 from radarsim.world.planes import STRAIGHT, regions
 
-#: Neighbouring triangles that turn by less are of one surface, rad: the step of a column of 18 sides and more.
+#: Largest angle between neighbouring triangles of one surface, rad: that of a cylinder of 18 sides or more.
 CREASE = np.deg2rad(21)
-#: Those that turn by less are coplanar, rad.
+#: Largest angle between coplanar triangles, rad.
 COPLANAR = np.deg2rad(0.3)
-#: A piece has at least this many facets: fewer are a bend between plates.
+#: Smallest number of facets of a piece: fewer are a bend between plates.
 FEWEST = 4
-#: Neighbouring triangles are of one piece if their principal curvatures differ by less than this share, and of one sign
-#: where one is more than that share of the other.
+#: Largest relative difference of the principal curvatures of neighbouring triangles of one piece; a curvature above
+#: this fraction of the other must have the same sign.
 LIKE, LITTLE = 0.5, 0.15
-#: An uneven plane is at least so large, m^2; less is left between the regions of a surface that bends.
+#: Smallest area of an uneven plane, m^2; smaller areas remain between the regions of a curved surface.
 UNEVEN = 0.01
-#: Means of normals that are wrong by more than this, rad, count for little; so many rounds find out which.
+#: Error of a mean normal, rad, above which its weight drops, and number of iterations that determine the weights.
 WRONG, ROUNDS = 0.005, 6
-#: Corners that are off a cubic through so many neighbours by more than this, m, RMS, are noisy.
+#: RMS distance from a cubic through neighbours, m, above which corners are noisy, and number of neighbours.
 NEIGHBOURS, NOISY = 32, 1e-5
 
 
 class Piece(NamedTuple):
-    """A smooth surface over some triangles of a mesh.
+    """Smooth surface over some triangles of a mesh.
 
     Attributes:
-        place: corners, m.
+        place: positions of the corners, m.
         normal: unit vectors at the corners, outwards as the triangles have it.
-        curvature: at the corners, how the normal turns along the surface, 1/m: xx, xy, xz, yy, yz, zz of a symmetric
+        curvature: at the corners, change of the normal along the surface, 1/m: xx, xy, xz, yy, yz, zz of a symmetric
             tensor; positive where it is convex.
         faces: corners of triangles, counter-clockwise.
-        across: the triangle beyond the side opposite each corner; -1: none.
+        across: neighbouring triangle across the side opposite each corner; -1: none.
         border: sides of triangles where the piece ends, the surface on the left.
     """
 
@@ -63,12 +63,12 @@ class Piece(NamedTuple):
 def pieces(
     mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"], smallest: float
 ) -> tuple[list[Piece], Bool[np.ndarray, "face"]]:
-    """Smooth curved pieces of a mesh, and which of its triangles they take.
+    """Find smooth curved pieces of a mesh, and the triangles that they replace.
 
     Args:
         mesh: triangles that share corners where they join.
-        among: which triangles to take.
-        smallest: pieces of less area are left out, m^2.
+        among: mask of triangles to use.
+        smallest: smallest area of a piece, m^2.
     """
     found: list[Piece] = []
     taken = np.zeros(len(mesh.faces), bool)
@@ -106,7 +106,7 @@ def pieces(
 def _filled(
     groups: list[np.ndarray], pairs: Int[np.ndarray, "pair 2"], area: Float[np.ndarray, "face"]
 ) -> Int[np.ndarray, "face"]:
-    """The group that each triangle is of, -1: none; odd triangles between two of one group are of it, too."""
+    """Group of each triangle, -1: none; isolated triangles between two of one group are added to it."""
     group = np.full(len(area), -1)
     for k, faces in enumerate(groups):
         group[faces] = k
@@ -120,7 +120,7 @@ def _filled(
 
 
 def _uneven(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"]) -> Bool[np.ndarray, "face"]:
-    """Triangles of uneven planes, as a scan has them."""
+    """Mask of triangles of uneven planes, as in scans."""
     rows, uneven = np.flatnonzero(among), np.zeros(len(mesh.faces), bool)
     for faces in regions(trimesh.Trimesh(mesh.vertices, mesh.faces[rows], process=False)):
         if mesh.area_faces[rows[faces]].sum() > UNEVEN and len(np.unique(mesh.faces[rows[faces]])) > 6:
@@ -134,11 +134,12 @@ def _surfaces(
     Float[np.ndarray, "corner 3"], Float[np.ndarray, "corner 3"], Int[np.ndarray, "face 3"],
     Float[np.ndarray, "face 3 3"],
 ]:  # fmt: skip
-    """Corners, one each for every surface that meets there, their unit normals, which are whose, and how normals turn.
+    """Corners, separate for each surface that meets there, their unit normals, corners of the triangles, and
+    curvatures.
 
     Args:
         mesh, rows: some triangles of a mesh.
-        pairs: of them that are of one surface.
+        pairs: pairs of them that are on one surface.
     """
     surface = trimesh.graph.connected_component_labels(pairs, len(rows))
     triangles = mesh.triangles[rows]
@@ -166,7 +167,7 @@ def _surfaces(
 def _by_chords(
     place: Float[np.ndarray, "corner 3"], mean: Float[np.ndarray, "corner 3"], sides: Int[np.ndarray, "side 2"]
 ) -> Float[np.ndarray, "corner 3"]:
-    """Normals near some means for which sides are chords of circles."""
+    """Normals near given means for which sides are chords of circles."""
     chord = _unit(place[sides[:, 1]] - place[sides[:, 0]])
     columns = 3 * sides[:, :, None] + np.arange(3)
     rows = np.broadcast_to(np.arange(len(sides))[:, None, None], columns.shape)
@@ -174,7 +175,7 @@ def _by_chords(
     chords = scipy.sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), (len(sides), mean.size))
     off = np.append(chords @ mean.ravel(), np.zeros(mean.size))
     change = np.zeros_like(mean)
-    for _ in range(ROUNDS):  # what has to change much is not held to its mean
+    for _ in range(ROUNDS):  # normals that must change much are not tied to their mean
         anchor = 1 / (1 + np.sum(change**2, axis=1) / WRONG**2)
         equations = scipy.sparse.vstack([chords, scipy.sparse.diags_array(anchor.repeat(3))])
         change = lsmr(equations, -off, maxiter=200)[0].reshape(-1, 3)
@@ -183,7 +184,7 @@ def _by_chords(
 
 
 def _jets(place, normal, surface):
-    """Which corners are of noisy surfaces; and all places, normals and tensors by cubics through neighbours."""
+    """Mask of corners of noisy surfaces; and all positions, normals and tensors by cubics through neighbours."""
     if len(place) <= NEIGHBOURS:
         return np.zeros(len(place), bool), None
     away, near = cKDTree(place).query(place, NEIGHBOURS + 1)
@@ -198,7 +199,7 @@ def _jets(place, normal, surface):
     fit = np.linalg.solve(square, np.einsum("cki,ck,ck->ci", terms, weight, z)[..., None])[..., 0]
     rest = np.einsum("ck,ck->c", weight, (np.einsum("cki,ci->ck", terms, fit) - z) ** 2)
     rest = np.sqrt(rest / np.maximum(weight.sum(axis=1), 1e-9)) * reach[:, 0]
-    # what a cubic leaves of the quartic term of a circle is no noise
+    # the quartic term of a circle beyond a cubic is not noise
     rest -= np.abs(fit[:, 3:6]).max(axis=1) ** 3 * reach[:, 0] / 40
     fitted = (weight > 0).sum(axis=1) > 15
     for one in np.unique(surface):
@@ -212,7 +213,7 @@ def _jets(place, normal, surface):
 def _turning(
     place: Float[np.ndarray, "face 3 3"], normal: Float[np.ndarray, "face 3 3"]
 ) -> Float[np.ndarray, "face 3 3"]:
-    """How normals turn over triangles, 1/m."""
+    """Change of the normal over triangles, 1/m."""
     axes = _axes(place)
     sides, turns = (np.einsum("fad,fkd->fak", axes, x[:, 1:] - x[:, :1]) for x in (place, normal))
     nothing = np.abs(np.linalg.det(sides)) < 1e-12
@@ -236,7 +237,7 @@ def _axes(place: Float[np.ndarray, "face 3 3"]) -> Float[np.ndarray, "face 2 3"]
 
 
 def _sense(bend: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "n 2"]:
-    """Whether principal curvatures are convex (1), concave (-1) or, beside the other one, nothing."""
+    """Sign of principal curvatures: convex (1), concave (-1) or, relative to the other one, negligible (0)."""
     return np.sign(np.where(np.abs(bend) < LITTLE * np.abs(bend).max(axis=1, keepdims=True), 0, bend)).astype(int)
 
 
@@ -244,7 +245,7 @@ def _piece(
     place: Float[np.ndarray, "corner 3"], normal: Float[np.ndarray, "corner 3"], corners: Int[np.ndarray, "face 3"],
     tensor: Float[np.ndarray, "face 3 3"], pairs: Int[np.ndarray, "pair 2"],
 ) -> Piece:  # fmt: skip
-    """The piece of some triangles with these corners and tensors, and which of them join."""
+    """Build the piece of some triangles with these corners and tensors, and its connectivity."""
     used, own = np.unique(corners, return_inverse=True)
     own = own.reshape(-1, 3)
     across = np.full(own.shape, -1)

@@ -1,10 +1,10 @@
-"""The diffuse surface of a scene: scatterers drawn where and when they are needed, the same ones every time.
+"""Diffuse surface of a scene: scatterers generated on demand, reproducibly.
 
-The triangles are cut until no edge is longer than a metre and gathered into tiles. A tile's scatterers are not kept:
-the k-th one's place, phase and rank follow from the seed, the tile's number and k by hashing. So memory is that of the
-triangles, whatever the density; a frame costs what stands within the radar's reach, whatever the size of the building;
-and speckle is still a property of the world. Within a tile, scatterers follow a low-discrepancy sequence (R2, Roberts
-2018) in the order of their ranks, so that any first few of them cover it evenly: see `detail`.
+The triangles are split until no edge is longer than a metre and grouped into tiles. A tile's scatterers are not stored:
+position, phase and rank of the k-th one follow from the seed, the tile's index and k by hashing. So memory is that of
+the triangles, whatever the density; the cost of a frame depends on the surfaces in the radar's reach, not on the size
+of the building; and speckle is a property of the world. Within a tile, scatterers follow a low-discrepancy sequence
+(R2, Roberts 2018) in the order of their ranks, so that any first few of them cover it evenly: see `detail`.
 """
 
 from dataclasses import dataclass, replace
@@ -21,10 +21,10 @@ from radarsim.propagation.reverberation import Detours
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene
 
-#: Scatterers per square metre at full detail; with level of detail twelve or more are left in a range-azimuth cell of
+#: Scatterers per square metre at full detail; with level of detail twelve or more remain in a range-azimuth cell of
 #: the `radarize` preset in an office.
 DENSITY = 300.0
-#: Edge of the cells that tiles are gathered in, and longest edge of a triangle, m.
+#: Edge of the cells of tiles, and longest edge of a triangle, m.
 TILE = 1.0
 # Steps of the R2 sequence: powers of the inverse of the plastic number.
 _R2 = (0.7548776662466927, 0.5698402909980532)
@@ -35,7 +35,7 @@ class Surface:
 
     Args:
         scene: the world; objects with sigma0 = 0 have no scatterers.
-        rng: draws the seed.
+        rng: random generator of the seed.
         density: scatterers per square metre at full detail.
     """
 
@@ -73,21 +73,21 @@ class Surface:
         self._lobe = np.array([weights(o.material) for o in used]).reshape(-1, 4)
 
     def __len__(self) -> int:
-        """Scatterers there are in all, on average."""
+        """Mean number of all scatterers."""
         return int(self._tile_areas.sum() * self.density)
 
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
-        """Those scatterers within `reach` (m) of any of the positions that their rank lets be seen from there."""
+        """Scatterers within `reach` (m) of any of the positions whose rank makes them visible from there."""
         tiles, distance = self._grid.near(positions, reach)
         return self._draw(tiles, np.minimum(2 * FULL_DETAIL / np.maximum(distance, 1e-3), 1.0))
 
     def all(self) -> Scatterers:
-        """Every scatterer, at full weight from everywhere."""
+        """Every scatterer, at full weight at any distance."""
         drawn = self._draw(np.arange(len(self._owner)), np.ones(len(self._owner)))
         return replace(drawn, rank=np.full(len(drawn), -1.0))
 
     def _draw(self, tiles: Int[np.ndarray, "tile"], highest: Float[np.ndarray, "tile"]) -> Scatterers:
-        """Scatterers of some tiles up to a rank each."""
+        """Generate the scatterers of some tiles up to a rank each."""
         totals, counts = _counts(self.seed, tiles, self._tile_areas * self.density, highest)
         ends = np.cumsum(counts)
         total = int(ends[-1]) if len(ends) else 0
@@ -104,7 +104,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Cluttered:
-    """A surface and the small objects on it, as one set of scatterers, and how waves go to and fro between them."""
+    """A surface and the small objects on it, as one set of scatterers, with the diffuse multipath between them."""
 
     surface: Surface
     clutter: Clutter
@@ -114,15 +114,15 @@ class Cluttered:
         return len(self.surface) + len(self.clutter)
 
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
-        """Those within `reach` (m) of any of the positions, see `Surface.near`."""
+        """Scatterers within `reach` (m) of any of the positions, see `Surface.near`."""
         return Scatterers.joined([part.near(positions, reach) for part in (self.surface, self.clutter)])
 
 
-Scattering = Surface | Cluttered | Scatterers  # what gives the scatterers near some positions
+Scattering = Surface | Cluttered | Scatterers  # sources of scatterers near some positions
 
 
 def _split(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "m 3 3"]:
-    """Triangles halved across their longest edge until it is no longer than a tile."""
+    """Split triangles across their longest edge until it is no longer than a tile."""
     done = []
     while len(triangles):
         edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
@@ -138,7 +138,7 @@ def _split(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "m 3 3"]:
 
 @njit(inline="always")
 def _hash(a, b):
-    """Two 64-bit words to one, mixed by the finaliser of splitmix64 (Steele, Lea, Flood, OOPSLA 2014)."""
+    """Hash two 64-bit words to one, mixed by the finaliser of splitmix64 (Steele, Lea, Flood, OOPSLA 2014)."""
     x = a + np.uint64(0x9E3779B97F4A7C15) * (b + np.uint64(1))
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -147,13 +147,14 @@ def _hash(a, b):
 
 @njit(inline="always")
 def _uniform(word):
-    """A number in 0...1 from a word's upper 53 bits."""
+    """Number in 0...1 from a word's upper 53 bits."""
     return np.float64(word >> np.uint64(11)) * 1.1102230246251565e-16
 
 
 @njit(cache=True)
 def _counts(seed, tiles, expected, highest):
-    """Scatterers per tile in all, and how many of them to draw. Fractions round up by chance, so means are exact."""
+    """Total number of scatterers per tile, and number to draw. Fractions are rounded up at random, so means are
+    exact."""
     totals, counts = np.empty(len(tiles), np.int64), np.empty(len(tiles), np.int64)
     for i in range(len(tiles)):
         tile = tiles[i]
@@ -164,10 +165,10 @@ def _counts(seed, tiles, expected, highest):
 
 @njit(parallel=True, cache=True)
 def _place(seed, tiles, totals, counts, ends, ground, columns):
-    """Place the scatterers of some tiles.
+    """Generate the scatterers of some tiles.
 
     Args:
-        seed, tiles, totals, counts: of `_counts`.
+        seed, tiles, totals, counts: see `_counts`.
         ends: one after the last scatterer of each tile.
         ground: the first triangle of each tile, areas up to each triangle's end (m^2), corners (m).
         columns: places, triangles, phases, ranks, weights over one mirror and over two of scatterers: filled in.

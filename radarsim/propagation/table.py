@@ -1,4 +1,4 @@
-"""Rows in parallel arrays: what a batch has many of, for numpy and for compiled kernels."""
+"""Tables of parallel arrays, for numpy and for compiled kernels."""
 
 from collections import namedtuple
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Table:
-    """Arrays of the same length; `rows[index]` takes some of them, `columns` is what compiled kernels take.
+    """Arrays of the same length; `rows[index]` selects rows, `columns` is the argument for compiled kernels.
 
     Attributes:
         SHARED: fields that belong to all rows together.
@@ -20,14 +20,14 @@ class Table:
     SHARED: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls):
-        # numba tells named tuples apart by their names alone
+        # numba distinguishes named tuples by their names only
         columns = [name for name in cls.__annotations__ if name not in cls.SHARED]
         cls.Columns = namedtuple(f"{cls.__name__}Columns", columns)
         cls.Columns.__module__, cls.Columns.__qualname__ = cls.__module__, f"{cls.__qualname__}.Columns"
 
     @property
     def columns(self) -> tuple:
-        """The arrays by name, as a named tuple."""
+        """Arrays by name, as a named tuple."""
         return self.Columns(*(getattr(self, name) for name in self.Columns._fields))
 
     def __len__(self) -> int:
@@ -43,19 +43,19 @@ class Table:
 
     @classmethod
     def zeros(cls, n: int) -> Self:
-        """Rows of zeros, of the types and shapes that the columns are annotated with."""
+        """Rows of zeros, with the types and shapes of the columns' annotations."""
         kinds = [cls.__annotations__[name] for name in cls.Columns._fields]
         shapes = [(n, *map(int, kind.dim_str.split()[1:])) for kind in kinds]
         return cls(*(np.zeros(s, kind.dtypes[-1].rstrip("_")) for s, kind in zip(shapes, kinds, strict=True)))
 
     @classmethod
     def from_rows(cls, rows: list[tuple]) -> Self:
-        """A table of the values of each row, in the order of the columns."""
+        """Table of the values of each row, in the order of the columns."""
         return cls(*(np.array(column) for column in zip(*rows, strict=True))) if rows else cls.zeros(0)
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:
-        """All rows of several tables."""
+        """Concatenate several tables."""
         some = [part for part in parts if len(part)]
         if len(some) == 1 and not cls.SHARED:
             return some[0]
@@ -66,12 +66,12 @@ Rows = TypeVar("Rows", bound=Table)
 
 
 def filled(table: type[Rows], fill: Callable[[Rows], int], size: int = 4096) -> Rows:
-    """A table of as many rows as there turn out to be.
+    """Build a table with a number of rows not known in advance.
 
     Args:
         table: its type.
-        fill: writes as many rows as fit; returns how many there are.
-        size: rows to begin with; where there are more, `fill` has to begin anew.
+        fill: function that writes as many rows as fit and returns their number.
+        size: rows of the first attempt; if there are more, `fill` is called again.
     """
     while True:
         found = table.zeros(size)

@@ -1,4 +1,4 @@
-"""The scatterers that may matter to any of some frames, those of moving targets where they are in each."""
+"""Scatterers in reach of a batch of frames, those of moving targets at their position in each frame."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,12 @@ class Targets:
     """Scatterers of a batch.
 
     Attributes:
-        scatterers: the surface's, then those of moving targets where they are in the first frame, in the second, and so
+        scatterers: those of the surface, followed by those of moving targets in the first frame, in the second, and so
             on.
-        still: how many are the surface's.
-        owner: the frame that a scatterer is for; -1: all.
-        weights: of a scatterer's power in echoes with 0, 1, and 2 or more mirrors on the way; slabs, however many, are
-            one more.
+        still: number of the surface's scatterers.
+        owner: frame of a scatterer; -1: all.
+        weights: weight of a scatterer's power in echoes with 0, 1, and 2 or more mirrors on the path; slabs, however
+            many, count as one more.
     """
 
     scatterers: Scatterers
@@ -31,7 +31,7 @@ class Targets:
 
     @classmethod
     def of(cls, observation: Observation, surface: Scattering, moving: MovingTargets | None) -> "Targets":
-        """The surface's scatterers within range of any pose, and all moving targets'."""
+        """Scatterers of the surface within range of any pose, and of all moving targets."""
         found = surface.near(observation.position, observation.range)
         still = len(found)
         owner = np.full(still, -1)

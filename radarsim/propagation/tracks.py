@@ -1,4 +1,4 @@
-"""Where the paths of what moves are at the nodes of a burst: scatterers on movers, and moving plates as mirrors."""
+"""Tracks of moving paths at the nodes of a burst: scatterers on movers, and moving plates as mirrors."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from radarsim.propagation.reflectors import Flat
 
 
 def followed(view: View, config: RadarConfig, paths: Paths) -> Paths:
-    """Paths with tracks of those that move."""
+    """Add the tracks of moving paths."""
     flat = view.facing
     moving = paths.moving | (np.append(flat.plate, -1)[paths.mirrors] >= 0).any(axis=1)
     rows = np.flatnonzero(moving)
@@ -27,7 +27,7 @@ def followed(view: View, config: RadarConfig, paths: Paths) -> Paths:
     own = _own(view, config, some[points])
     for end in range(2):
         chain = _reflections(flat, some.mirrors[points, 2 * end : 2 * end + 2], moves)
-        place = image(inverse(chain[:, 3]), some.points[:, end])  # itself, and not as seen in the mirrors
+        place = image(inverse(chain[:, 3]), some.points[:, end])  # the scatterer itself, not its image in the mirrors
         tracks[points, :, 3 * end : 3 * end + 3] = image(chain[:, :3], place[:, None] + own)
     # a plate's own echo moves with the plate, one over several mirrors by the product of their reflections
     mirrors, now = some.mirrors[images, :3], some.images[:, None]
@@ -43,12 +43,12 @@ def followed(view: View, config: RadarConfig, paths: Paths) -> Paths:
 def _reflections(
     flat: Flat, mirrors: Int[np.ndarray, "n mirror"], moves: Float[np.ndarray, "frame plate 4 3 4"]
 ) -> Float[np.ndarray, "n 4 3 4"]:
-    """Products of the reflections in some mirrors (-1: none) at a burst's nodes and in its middle.
+    """Products of the reflections in some mirrors (-1: none) at a burst's nodes and at its centre.
 
     Args:
         flat: all mirrors.
         mirrors: in order from the sensor on.
-        moves: as `MovingPlates.moves` has them.
+        moves: see `MovingPlates.moves`.
     """
     out = np.zeros((len(mirrors), 4, 3, 4))
     out[..., :3] = np.eye(3)
@@ -64,7 +64,7 @@ def _reflections(
 
 
 def _own(view: View, config: RadarConfig, points: Paths) -> Float[np.ndarray, "point 3 3"]:
-    """How far scatterers on movers have moved from the middle to the burst's nodes (point, node, axis), m."""
+    """Displacement of scatterers on movers from the centre to the burst's nodes (point, node, axis), m."""
     moving, targets = view.environment.moving, view.targets
     offsets = BurstClock.of(config).half * np.append(NODES, 0.0)
     own = np.zeros((len(points), 3, 3))

@@ -1,4 +1,4 @@
-"""What passes through walls, panes and doors: loss, phase and delay of thin slabs on a ray's way."""
+"""Transmission through walls, panes and doors: loss, phase and delay of thin slabs on a ray."""
 
 from functools import cached_property
 
@@ -14,17 +14,17 @@ from radarsim.world import shapes
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
-#: A ray is given up behind this many slabs: one stud wall with a board on either side, or two panes.
+#: Largest number of slabs on a ray: one stud wall with a board on either side, or two panes.
 MOST_SLABS = 2
 
 
 class Transmission:
-    """The thin objects of a scene (`media`).
+    """Transmission through the thin objects of a scene (`media`).
 
     Args:
-        scene: ray tests run on its geometry.
-        config: gives the frequency.
-        margin: rays start and end this far from their ends, m.
+        scene: geometry for ray tests.
+        config: radar configuration, for the frequency.
+        margin: distance from both ends at which rays start and end, m.
     """
 
     def __init__(self, scene: Scene, config: RadarConfig, margin: float):
@@ -34,12 +34,12 @@ class Transmission:
         self._layer, self._body = np.array([number.get(slab, -1) for slab in slabs]), np.array(whole)
         self._layers = np.array([layer(slab, config) for slab in number]).reshape(-1, LAYER)
         self._share = sweep_share(config)
-        #: what small objects on a face leave of the amplitude
+        #: amplitude factor by small objects on a face
         self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
 
     @cached_property
     def opaque(self) -> Scene | None:
-        """What of the scene nothing passes, as one object; None: nothing."""
+        """Opaque geometry of the scene, as one object; None: there is none."""
         solid = [item for item, layer in zip(self.scene.objects, self._layer, strict=True) if layer < 0]
         if not solid or len(solid) == len(self._layer):
             return self.scene if solid else None
@@ -49,11 +49,11 @@ class Transmission:
     def passage(
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], up: Float[np.ndarray, "n 3"]
     ) -> tuple[Complex[np.ndarray, "n"], Float[np.ndarray, "n"]]:
-        """What is left of waves with an upright field on their way from origins to targets.
+        """Factor and delay of vertically polarised waves from origins to targets.
 
         Returns:
-            factor on the beat signal's amplitude (0: opaque), and the length by which the slabs delay it, m. The phase
-            of the factor is relative to a path that is longer by the delay.
+            Factor on the beat signal's amplitude (0: opaque), and the delay by the slabs, m. The phase of the factor is
+                relative to a path that is longer by the delay.
         """
         way = targets - origins
         lengths = np.linalg.norm(way, axis=1)
@@ -66,7 +66,7 @@ class Transmission:
             w = under_way
             distance, triangle = self.scene.hit(origins[w] + start[w, None] * way[w], way[w])
             at = start[w] + distance
-            struck = (at < lengths[w] - self.margin) & (triangle >= 0)  # the others have arrived
+            struck = (at < lengths[w] - self.margin) & (triangle >= 0)  # the others have reached their target
             w, at, triangle = w[struck], at[struck], triangle[struck]
             item = self.scene.triangle_object[triangle]
             leaving = inside[w] == item  # the far face of a body whose slab has been counted
@@ -89,7 +89,7 @@ class Transmission:
 
 @njit(cache=True)
 def _through(layers, ways, normals, ups, share):
-    """Factor and delay (in 1 / k) of one slab each: TE and TM parts of the upright field."""
+    """Factor and delay (in 1 / k) of one slab per ray: TE and TM parts of the vertical field."""
     factor, delay = np.empty(len(ways), np.complex128), np.empty(len(ways))
     for i in range(len(ways)):
         way, normal, up = vec(ways[i]), vec(normals[i]), vec(ups[i])

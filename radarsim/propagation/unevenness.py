@@ -1,4 +1,4 @@
-"""Walls that are not quite flat: what unevenness makes of their specular reflection.
+"""Unevenness of walls: its effect on their specular reflection.
 
 A plastered wall keeps within some millimetres of its plane: DIN 18202, table 3, row 6, allows 3 mm between points 10 cm
 apart, 5 mm at 1 m, 10 mm at 4 m. Here its height z over the plane is a smooth random field of the world, with a
@@ -15,11 +15,11 @@ the radar. Free space is an all-pass filter, so moving along the wall by d, F ha
 
     <F F*'> = exp(-(2k)^2 (<z^2> - <z z'>)):   <F> = exp(-(2k)^2 <z^2> / 2),   <|F|^2> = 1
 
-(Beckmann and Spizzichino 1963, chapter 5, without the paraxial terms). So unevenness does not dim it on average:
-it makes it fade and shine from place to place, as slopes of a degree scatter within any beam of a small array.
+(Beckmann and Spizzichino 1963, chapter 5, without the paraxial terms). So unevenness does not reduce the mean power:
+it causes fading from place to place, because slopes of a degree scatter within the beam of a small array.
 
-A plate's edges near the foot take the same factor, so that nothing jumps where the foot leaves the plate; far from it
-an edge is met with along a line, and is left as it is. Ghosts and corners keep theirs: on average it is 1.
+A plate's edges near the foot get the same factor, so that it is continuous where the foot leaves the plate; far from it
+an edge is met along a line, and is not changed. Ghosts and corners are not changed either: the mean of the factor is 1.
 """
 
 from dataclasses import dataclass
@@ -30,24 +30,24 @@ from numba import njit, prange
 
 from radarsim.world.scene import Scene
 
-#: RMS heights and correlation lengths of the scales at level 1, m.
+#: RMS heights and correlation lengths of the two scales at level 1, m.
 SCALES = ((0.8e-3, 0.25), (0.2e-3, 0.04))
-#: Plane waves at each scale.
+#: Number of plane waves at each scale.
 WAVES = 24
-#: Heights of surfaces over plaster's; what is not named (glass, steel, boards of furniture) is flat.
+#: Heights of surfaces relative to plaster's; surfaces that are not named (glass, steel, boards of furniture) are flat.
 FINISHES = {
     "plasterboard": 1.0, "concrete": 1.0, "brick": 1.5, "ceiling board": 1.0, "floorboard": 0.7, "vinyl": 0.7,
     "carpet": 0.7, "marble": 0.5,
 }  # fmt: skip
-#: Slopes up to so many times the RMS lead back to the radar, and so many radii of the Fresnel zone matter.
+#: Largest slopes that lead back to the radar, relative to the RMS, and reach in radii of the Fresnel zone.
 SLOPES, ZONES = 3.0, 2.5
-#: Samples over what is needed.
+#: Oversampling.
 FINER = 1.25
 
 
 @dataclass(frozen=True)
 class Heights:
-    """A random height field of the world: z(x) = sum a cos(q . x + phase), m.
+    """Random height field of the world: z(x) = sum a cos(q . x + phase), m.
 
     Attributes:
         wave: q, rad/m.
@@ -61,7 +61,7 @@ class Heights:
 
     @classmethod
     def of(cls, scene: Scene, rng: np.random.Generator) -> "Heights | None":
-        """The scene's; None where all is flat."""
+        """Height field of a scene; None if all surfaces are flat."""
         if scene.surface_settings.unevenness == 0:
             return None
         wave = [np.sqrt(2) / length * rng.standard_normal((WAVES, 3)) for _, length in SCALES]
@@ -69,7 +69,7 @@ class Heights:
         return cls(np.concatenate(wave), rng.uniform(0, 2 * np.pi, WAVES * len(SCALES)), np.concatenate(size))
 
     def __call__(self, place: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
-        """Heights at some places, m."""
+        """Heights at some positions, m."""
         return np.cos(place @ self.wave.T + self.phase) @ self.size
 
     @property
@@ -80,17 +80,17 @@ class Heights:
     def reach(
         self, away: Float[np.ndarray, "n"], finish: Float[np.ndarray, "n"], wavelength: float
     ) -> Float[np.ndarray, "n"]:
-        """How far around its foot a surface matters that is so far away, m."""
+        """Radius around its foot within which a surface at a given distance matters, m."""
         return SLOPES * finish * self.slope * away + ZONES * np.sqrt(wavelength * away / 2)
 
     def factors(
         self, position: Float[np.ndarray, "n 3"], foot: Float[np.ndarray, "n 3"], finish: Float[np.ndarray, "n"],
         wavelength: float,
     ) -> Complex[np.ndarray, "n"]:  # fmt: skip
-        """F of surfaces at their feet, seen from positions (m) straight before them.
+        """F of surfaces at their feet, seen from positions (m) on the normal.
 
         Args:
-            finish: heights over those of this field.
+            finish: heights relative to those of this field.
         """
         normal = position - foot
         away = np.linalg.norm(normal, axis=1)
@@ -99,7 +99,7 @@ class Heights:
         u /= np.linalg.norm(u, axis=1)[:, None]
         v = np.cross(normal, u)
         reach = self.reach(away, finish, wavelength)
-        # Samples between which the phase turns by less than a full circle: the sum sees none of its images.
+        # Sample spacing with a phase change below a full circle: the sum contains none of its images.
         steepest = 4 * np.pi / wavelength * (reach / away + SLOPES * finish * self.slope)
         count = np.ceil(FINER * reach * steepest / (2 * np.pi)).astype(np.int64)
         start = foot @ self.wave.T + self.phase
@@ -116,7 +116,7 @@ def _factors(start, along, across, size, away, reach, count, wavelength):
         weight, flat = np.empty(n, np.complex128), 0j
         for i in range(n):
             x = (i - count[f]) * step
-            fade = min(max(2 * (1 - abs(x) / reach[f]), 0.0), 1.0)  # zero at the rim, one from half way on
+            fade = min(max(2 * (1 - abs(x) / reach[f]), 0.0), 1.0)  # zero at the rim, one below half the radius
             weight[i] = fade * fade * (3 - 2 * fade) * np.exp(1j * k * x * x / away[f])
             flat += weight[i]
         waves = size.shape[1]

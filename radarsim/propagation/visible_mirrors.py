@@ -1,4 +1,4 @@
-"""Which flat reflectors the radar sees, and which of them see one another by their mirror images."""
+"""Flat reflectors visible to the radar, and pairs of them visible over each other."""
 
 from typing import NamedTuple
 
@@ -13,14 +13,14 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import CLEARANCE, Obstacles
 from radarsim.propagation.reflectors import Flat
 
-#: A reflector is looked at in points, one to this area and at least `FEWEST`; one of which none is seen is left out.
+#: Area per test point of a reflector, and smallest number of points; a reflector without a visible point is left out.
 SPACING, FEWEST, MOST = 0.02, 4, 240
-#: Apertures pass some light by their edges: this far from them a ray may lie, m; `apertures.FAR` zones at 8 m.
+#: Distance from its edge at which an aperture still passes some power, m; `apertures.FAR` zones at 8 m.
 MARGIN = 0.25
-#: Reflectors near one another that are looked at together before one by one.
+#: Number of neighbouring reflectors tested together before one by one.
 RUN = 16
-#: A reflector stands before another from this height over its plane on, m: the faces of an outer edge do not see one
-#: another, however near light passes the edge.
+#: Height above its plane from which a reflector is in front of another, m: the faces of an outer edge are not visible
+#: to one another, however close to the edge a wave passes.
 BEFORE = 1e-3
 
 
@@ -28,9 +28,9 @@ class Mirrors(NamedTuple):
     """Flat reflectors of one frame, as indices.
 
     Attributes:
-        seen: those of which the radar sees something.
-        pairs: the first one seen; light from the radar may go on from it to the second. A ray comes back over (a, b) if
-            both (a, b) and (b, a) are among them, and over (a, b, c) if (a, b) and (c, b) are.
+        seen: reflectors with a visible part.
+        pairs: visible first reflector, and the second one that waves from the radar can reach over it. Waves return
+            over (a, b) if both (a, b) and (b, a) are pairs, and over (a, b, c) if (a, b) and (c, b) are.
     """
 
     seen: Int[np.ndarray, "mirror"]
@@ -38,12 +38,12 @@ class Mirrors(NamedTuple):
 
     @classmethod
     def none(cls) -> "Mirrors":
-        """No mirror."""
+        """Empty set of mirrors."""
         return cls(np.zeros(0, int), np.zeros((0, 2), int))
 
 
 def find(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Mirrors]:
-    """Those of each frame."""
+    """Find the visible mirrors of each frame."""
     order = nearby_order(flat.center)
     return [
         Mirrors(some, couples(observation, frame, flat, some, order))
@@ -58,17 +58,17 @@ def couples(
     firsts: Int[np.ndarray, "n"],
     order: Int[np.ndarray, "mirror"] | None = None,
 ) -> Int[np.ndarray, "pair 2"]:
-    """Pairs with the first among some, of which light can go on to the second (`order`: `nearby_order` of centres)."""
+    """Pairs with the first reflector among some, over which waves can reach the second (`order`: `nearby_order`)."""
     order = nearby_order(flat.center) if order is None else order
     follows = np.zeros((len(firsts), len(flat)), bool)
     _couple(flat.columns, observation, frame, firsts, order, follows)
-    first, second = np.divmod(np.flatnonzero(follows), len(flat))  # a tenth of the time that two axes take
+    first, second = np.divmod(np.flatnonzero(follows), len(flat))  # ten times as fast as with two axes
     return np.stack([firsts[first], second], axis=1)
 
 
 def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Int[np.ndarray, "n"]]:
-    """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen, through as
-    many slabs as waves are followed."""
+    """Reflectors per frame that are in range, turn a face to the radar and have a visible part, through at most as many
+    slabs as waves are traced."""
     turned = np.zeros((observation.frames, len(flat)), np.bool_)
     _turned(flat.columns, observation, turned)
     index = [np.flatnonzero(some) for some in turned]
@@ -80,7 +80,7 @@ def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[In
     points, owner = _spread(flat, every, observation.position[frame], observation.range)
     begin, number = observation.position[frame[owner]], np.arange(len(owner)) - np.searchsorted(owner, owner)
     found, clear = np.zeros(len(every), bool), np.zeros(len(owner), bool)
-    for some in (number < FEWEST, number >= FEWEST):  # most show themselves in a few points
+    for some in (number < FEWEST, number >= FEWEST):  # a few points are enough for most
         rows = np.flatnonzero(some & ~found[owner])
         clear[rows] = ~opaque.occluded(begin[rows], points[rows], margin=CLEARANCE)
         found[owner[clear]] = True
@@ -91,7 +91,7 @@ def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[In
         found[:] = False
         found[owner[rows[free]]] = True
         up = observation.rotation[frame[owner], :, 2]
-        for _ in range(FEWEST):  # one point a reflector at a time, since slabs take long to count
+        for _ in range(FEWEST):  # one point per reflector at a time: counting slabs is slow
             left = rows[~found[owner[rows]]]
             _, first = np.unique(owner[left], return_index=True)
             left = left[first]
@@ -103,7 +103,7 @@ def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[In
 
 @njit(parallel=True, cache=True)
 def _turned(flat, observation, found):
-    """Which reflectors of each frame have a part within range and in front, and turn their face to the radar."""
+    """Reflectors of each frame with a part within range and in front, and a face turned to the radar."""
     for frame in prange(len(observation.position)):
         p, rotation = vec(observation.position[frame]), observation.rotation[frame]
         forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
@@ -125,7 +125,7 @@ def _turned(flat, observation, found):
 def _spread(
     flat: Flat, index: Int[np.ndarray, "n"], around: Float[np.ndarray, "n 3"], reach: float
 ) -> tuple[Float[np.ndarray, "point 3"], Int[np.ndarray, "point"]]:
-    """Points on reflectors, on the part within a square of +-`reach` around a position each; and whose they are."""
+    """Test points on reflectors, on the part within a square of +-`reach` around a position; and their reflectors."""
     u, v, half, center = flat.u[index], flat.v[index], flat.half[index], flat.center[index]
     foot = np.stack([np.einsum("md,md->m", around - center, axis) for axis in (u, v)], axis=1)
     low, high = np.clip(foot - reach, -half, half), np.clip(foot + reach, -half, half)
@@ -140,7 +140,7 @@ def _spread(
 
 @njit(parallel=True, cache=True)
 def _couple(flat, observation, frame, firsts, order, found):
-    """Which reflectors (columns) can follow the first ones (rows)."""
+    """Mark the reflectors (columns) that can follow the first ones (rows)."""
     edges, p = outlines(flat), vec(observation.position[frame])
     balls, runs = np.empty((len(flat.center), 5)), np.empty((-(-len(flat.center) // RUN), 5))
     for b in range(len(balls)):
@@ -156,7 +156,7 @@ def _couple(flat, observation, frame, firsts, order, found):
         ball[3] = 0.0
         for each in some:
             ball[3] = max(ball[3], length(minus(vec(each), vec(ball))) + each[3])
-    for each in (balls, runs):  # from an image of the radar to their middle, at most
+    for each in (balls, runs):  # largest distance of their centres from an image of the radar
         for ball in each:
             ball[4] = 2 * (observation.range + ball[3]) - length(minus(vec(ball), p))
     for i in prange(len(firsts)):
@@ -165,9 +165,9 @@ def _couple(flat, observation, frame, firsts, order, found):
 
 @njit(cache=True)
 def _follow(flat, radar, balls, a, window, found):
-    """Which reflectors can follow one: each must stand before the other, and seen from the radar's image in the first,
-    the second must overlap it, as a window. A quick look at balls, around some in a row and around each, leaves few to
-    look at closely."""
+    """Reflectors that can follow one: each must be in front of the other, and, seen from the radar's image in the
+    first, the second must overlap its window. A fast test of bounding balls, of groups and of each, leaves few for the
+    exact test."""
     (frame, p), (order, each, runs) = radar, balls
     ca, na, ua, va = vec(flat.center[a]), vec(flat.normal[a]), vec(flat.u[a]), vec(flat.v[a])
     height = dot(minus(p, ca), na)
@@ -193,7 +193,7 @@ def _follow(flat, radar, balls, a, window, found):
 
 @njit
 def _beside(ball, image, before, height, borders):
-    """Whether a ball (middle, radius, reach) is behind a mirror, beside what that shows from an image, or too far."""
+    """Whether a ball (centre, radius, reach) is behind a mirror, beside its window from an image, or too far."""
     way, r, reach = minus(vec(ball), image), ball[3], ball[4]
     if dot(way, before) - height < -r or dot(way, way) > reach * abs(reach):
         return True
@@ -203,14 +203,14 @@ def _beside(ball, image, before, height, borders):
 
 @njit
 def _border(before, axis, height, aside):
-    """Unit normal of the plane through the radar's image and a line across an axis, so far aside in the mirror."""
+    """Unit normal of the plane through the radar's image and a line across an axis at a given offset in the mirror."""
     size = np.hypot(height, aside)
     return along((-aside / size * before[0], -aside / size * before[1], -aside / size * before[2]), height / size, axis)
 
 
 @njit(cache=True)
 def _overlap(flat, a, b, radar, facing, window):
-    """The same of one reflector, by its corners."""
+    """The exact test of one reflector, by its corners."""
     ca, ua, va, cb, nb = vec(flat.center[a]), vec(flat.u[a]), vec(flat.v[a]), vec(flat.center[b]), vec(flat.normal[b])
     image, before, height = radar
     highest, farthest = -1e9, -1e9

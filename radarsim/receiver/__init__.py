@@ -1,1 +1,1 @@
-"""From propagation paths to samples: synthesis, front end, phase noise, interference, calibration."""
+"""Receiver model from propagation paths to samples: synthesis, front end, phase noise, interference, calibration."""

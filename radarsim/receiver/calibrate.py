@@ -1,9 +1,9 @@
-"""Fits the simulated front end to a real radar, from a few frames of one of its recordings.
+"""Calibration of the simulated front end against a few frames of a real radar's recording.
 
-What can be told from a recording and what cannot: counts have no absolute scale, so noise figure and receive gain are
-taken from the data sheet and the configuration, and the noise floor gives the converter's full scale. The band's upper
-edge shows in the noise, the leakage in the lowest range bins, the mount's echo a little farther, and the channels'
-errors wherever one echo outshines all others of its range and Doppler: there the array must see a plane wave.
+Counts have no absolute scale, so noise figure and receive gain are taken from the data sheet and the configuration,
+and the noise floor then gives the converter's full scale. The upper band edge is estimated from the noise spectrum, the
+leakage from the lowest range bins, the mount's echo from slightly higher ones, and the channel errors from cells that a
+single echo dominates, where the array must observe a plane wave.
 """
 
 from dataclasses import dataclass
@@ -24,27 +24,27 @@ from radarsim.receiver.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, MountEcho, PhaseNoise
 from radarsim.receiver.phasenoise import density
 
-#: Chirps of one transmitter that the noise is told from, at least.
+#: Smallest number of chirps per transmitter for an estimate of the noise.
 FEWEST_LOOPS = 8
-#: Delays (s) that count as leakage; beyond, it is an echo of something.
+#: Delays (s) regarded as leakage; longer ones are echoes.
 LEAKAGE_DELAYS = (0.1e-9, 1.2e-9)
-#: Share of a snapshot's power that one plane wave must explain for the channels to be told from it.
+#: Fraction of a snapshot's power that one plane wave must explain for an estimate of the channel errors.
 DOMINANCE = 0.95
-#: Distances (m) of what counts as the radar's own mount: beyond the leakage, and nearer than anything in a room.
+#: Distances (m) regarded as the radar's own mount: beyond the leakage, and nearer than any object in a room.
 MOUNT_DISTANCES = (0.1, 0.4)
-#: Amplitude over the leakage's, both behind the high-pass filter, below which an echo is what the leakage's image in an
-#: imperfect mixer leaves.
+#: Amplitude relative to the leakage's, both after the high-pass filter, below which an echo may be the leakage's image
+#: in an imperfect mixer.
 LEFT_OVER = 0.05
 _SNAPSHOTS = 60
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was found.
+    """Result of a calibration.
 
     Attributes:
-        settings: the front end.
-        remarks: what was measured and how, a sentence each.
+        settings: settings of the front end.
+        remarks: sentences on each estimate and its source.
     """
 
     settings: FrontEndConfig
@@ -55,12 +55,12 @@ def calibrate(recording: Path, output: Path, frames: int = 8) -> Calibration:
     """Fit a front end to a recording and write it as a file for `radarsim simulate --frontend`.
 
     Args:
-        recording: of a real radar; a few frames at rest, with one strong echo, are best.
+        recording: recording of a real radar; a few frames at rest, with one strong echo, are best.
         output: front-end file to write.
-        frames: how many to look at, spread over the recording.
+        frames: number of frames to use, spread over the recording.
 
     Raises:
-        InputError: no usable recording, too few chirps, or silence.
+        InputError: no usable recording, too few chirps, or no signal.
     """
     with Recording(recording) as opened:
         config = opened.config
@@ -71,7 +71,7 @@ def calibrate(recording: Path, output: Path, frames: int = 8) -> Calibration:
         chosen = np.unique(np.linspace(0, len(opened) - 1, min(frames, len(opened))).astype(int))
         whole = [k for k in chosen if opened.valid(k, k + 1).all()]
         if not whole:
-            raise InputError(f"{recording}: lost samples in all {len(chosen)} frames looked at, expected a whole one")
+            raise InputError(f"{recording}: lost samples in all {len(chosen)} frames read, expected a whole one")
         adc = np.concatenate([opened.adc(k, k + 1) for k in whole]).astype(np.float32)
     signal = adc.view(np.complex64)[..., 0]
     found = fit(signal, config, str(recording))
@@ -80,7 +80,7 @@ def calibrate(recording: Path, output: Path, frames: int = 8) -> Calibration:
 
 
 def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarConfig, source: str) -> Calibration:
-    """Fit a front end to samples; `source` is what errors name as their origin."""
+    """Fit a front end to samples; `source` names their origin in error messages."""
     profile = noise_profile(signal)
     n = config.samples
     flat = slice(n // 10, 8 * n // 10)
@@ -90,10 +90,10 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
     band, fall = band_edge(profile / floor)
     front_end = FrontEnd(config, FrontEndConfig.of(config.board, band=band))
     leak, mount = find_static(signal, front_end, floor)
-    # Thermal noise is what rounding of I and Q and the leakage's phase noise leave of it.
+    # Thermal noise is what remains without the rounding of I and Q and the leakage's phase noise.
     mask = front_end.settings.phase_noise
-    thermal = floor - 2 / 12 - (np.median(leak.skirt(config, mask)[flat]) if leak and mask else 0.0)
-    thermal = max(thermal, 0.1 * floor)  # a board with less phase noise than the mask's
+    thermal = floor - 2 / 12 - (np.median(leak.sidebands(config, mask)[flat]) if leak and mask else 0.0)
+    thermal = max(thermal, 0.1 * floor)  # a board may have less phase noise than the mask
     gain, factor = config.rx_gain_db, front_end.settings.noise_factor(config.rx_gain_db)
     dbm = 10 * np.log10(BOLTZMANN * ROOM_TEMPERATURE * config.sample_rate * factor / 1e-3) + gain
     full_scale = round(dbm + 20 * np.log10(32767) - 10 * np.log10(thermal), 2)
@@ -124,10 +124,10 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
 
 
 def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
-    """The decimation filter that explains how noise falls towards the sample rate, and the fall (dB)."""
+    """Decimation filter that explains how the noise falls towards the sample rate, and this fall (dB)."""
     n = len(profile)
     x = np.arange(n) / n
-    last = slice(n - n // 16, n - 2)  # the two topmost bins see the leakage around zero
+    last = slice(n - n // 16, n - 2)  # without the two highest bins, which contain leakage from around zero
     fall = -10 * np.log10(np.mean(profile[last]))
     upper = (x > 0.7) & (np.arange(n) < n - 2)
     measured = 10 * np.log10(profile[upper])
@@ -143,26 +143,26 @@ def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
 
 @dataclass(frozen=True)
 class _Static:
-    """A static echo in counts.
+    """Static echo in ADC counts.
 
     Attributes:
         delay: s.
         counts: amplitude of each channel before the high-pass filter.
-        heard: mean amplitude behind it.
+        heard: mean amplitude after it.
     """
 
     delay: float
     counts: Complex[np.ndarray, "tx rx"]
     heard: float
 
-    def skirt(self, config: RadarConfig, mask: PhaseNoise) -> Float[np.ndarray, "sample"]:
-        """Power per sample that its phase noise looks like in each range bin, counts^2."""
+    def sidebands(self, config: RadarConfig, mask: PhaseNoise) -> Float[np.ndarray, "sample"]:
+        """Power per sample of its phase noise in each range bin, counts^2."""
         f = np.arange(config.samples) * config.sample_rate / config.samples
         noise = density(mask, config.center_frequency, f) * 4 * np.sin(np.pi * f * self.delay) ** 2
         return np.mean(np.abs(self.counts) ** 2) * noise * config.sample_rate
 
     def relative(self, scale: float, config: RadarConfig) -> tuple[float, tuple[Channel, ...]]:
-        """Level (dB) and amplitudes of all channels as settings; `scale` is counts per unit of amplitude."""
+        """Level (dB) and amplitudes of all channels for the settings; `scale` is counts per unit of amplitude."""
         mean = np.sqrt(np.mean(np.abs(self.counts) ** 2)) / scale
         whole = np.full(config.channel_factors.shape, mean, complex)
         whole[config.channels] = self.counts / scale
@@ -172,7 +172,7 @@ class _Static:
 def find_static(
     signal: Complex[np.ndarray, "frame loop tx rx sample"], front_end: FrontEnd, floor: float
 ) -> tuple[_Static | None, _Static | None]:
-    """Leakage, and echo of the mount: delays and amplitudes of what stands still nearby, besides a constant offset."""
+    """Estimate leakage and mount echo: delays and amplitudes of static echoes nearby, apart from a constant offset."""
     config = front_end.config
     static = signal.mean(axis=(0, 1), dtype=complex)
     n = config.samples
@@ -194,8 +194,8 @@ def find_static(
         near = np.clip([start - delays[1] + delays[0], start + delays[1] - delays[0]], *span)
         return float(minimize_scalar(lambda d: explained([d, *others], bins)[0], bounds=near, method="bounded").x)
 
-    leak = best(LEAKAGE_DELAYS, [], 5)  # the lowest bins are the leakage's
-    apart = 0.5 / config.bandwidth  # nearer to each other, two tones explain anything by cancelling
+    leak = best(LEAKAGE_DELAYS, [], 5)  # the lowest bins contain only leakage
+    apart = 0.5 / config.bandwidth  # two tones at a smaller distance could fit anything by cancelling
     nearest, farthest = (2 * distance / SPEED_OF_LIGHT for distance in MOUNT_DISTANCES)
     mount = best((min(max(nearest, leak + apart), farthest), farthest), [leak], bins)
     first, last = LEAKAGE_DELAYS
@@ -214,8 +214,8 @@ def find_static(
 def fit_channels(
     signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarConfig, floor: float
 ) -> tuple[Mismatch, str]:
-    """Errors of the channels from snapshots that one plane wave dominates. A slope of the phase over the array cannot
-    be told from a direction, so there is none in the result."""
+    """Estimate the channel errors from snapshots dominated by one plane wave. A phase slope over the array cannot be
+    distinguished from a direction, so the result has none."""
     antennas = virtual_positions(config).reshape(-1, 3)
     if len(antennas) < 3:
         return Mismatch(), f"{len(antennas)} channels: mismatch left to the data sheet's bounds"
@@ -252,7 +252,7 @@ def fit_channels(
 def _snapshots(
     signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarConfig, floor: float
 ) -> list[Complex[np.ndarray, "virtual"]]:
-    """The strongest cells of all frames' range-Doppler maps, as if all channels had been sampled at once."""
+    """Strongest cells of all frames' range-Doppler maps, corrected for the TDM delays between channels."""
     loops, n = signal.shape[1], config.samples
     slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
@@ -260,7 +260,7 @@ def _snapshots(
     cube = cube * np.exp(-2j * np.pi * cycles)[:, :, None, None]
     cube = cube * load_board(config.board).signs[config.channels][:, :, None]
     power = np.sum(np.abs(cube) ** 2, axis=(2, 3))
-    far = config.ranges > 0.3  # nearer is leakage, or no plane wave
+    far = config.ranges > 0.3  # nearer cells contain leakage, or no plane wave
     noise = floor * cube.shape[2] * cube.shape[3] * np.sum(slow**2) * np.sum(fast**2)
     power = power * far * (power > 100 * noise)
     frame, doppler, bin_ = np.unravel_index(np.argsort(power, axis=None)[::-1][:_SNAPSHOTS], power.shape)
@@ -277,7 +277,8 @@ def _steering(
 def _direction(
     snapshot: Complex[np.ndarray, "virtual"], antennas: Float[np.ndarray, "virtual 3"], wavelength: float
 ) -> tuple[Float[np.ndarray, "2"], float]:
-    """Direction (sines to the left and up) of the plane wave that explains most of a snapshot, and how much."""
+    """Direction (sines to the left and up) of the plane wave that explains most of a snapshot, and the fraction
+    explained."""
 
     def unexplained(sines):
         response = np.vdot(_steering(np.asarray(sines), antennas, wavelength), snapshot)

@@ -1,4 +1,4 @@
-"""From the field at the antennas to ADC counts, in the order in which a receiver does it:
+"""Front end: from the field at the antennas to ADC counts, in the order of a receiver's stages:
 
     amplify     transmit power, receive gain, gain and phase of each channel
     couple      leakage from TX to RX, echoes of the mount
@@ -6,8 +6,8 @@
     mix         the image of an imperfect I/Q mixer
     convert     saturation and rounding
 
-The IF filters act on echoes, by path length, before the synthesis (`if_response`). What each step is made of is in
-`FrontEndConfig`; noise and filters live in frequency bins, where they are products.
+The IF filters act on echoes, by path length, before the synthesis (`if_response`). `FrontEndConfig` has the settings
+of each stage; noise and filters are computed in frequency bins, where filters are products.
 """
 
 from functools import cached_property
@@ -20,19 +20,19 @@ from radarize.io.errors import InputError
 from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
 from radarsim.receiver.frontend_config import FrontEndConfig, MountEcho
-from radarsim.receiver.phasenoise import Skirts
+from radarsim.receiver.phasenoise import Sidebands
 
 BOLTZMANN = 1.380649e-23
 ROOM_TEMPERATURE = 290.0
 
 
 class FrontEnd:
-    """The analogue and digital front end of one board.
+    """Analogue and digital front end of one board.
 
     Args:
-        config: radar configuration; gives receive gain, transmit back-off, filter corners, sample rate.
-        settings: what the front end is made of; default: what the board's file says.
-        rng: draws what stays the same for a board: mismatch, leakage, echoes of the mount. Default: board number 0.
+        config: radar configuration; with receive gain, transmit back-off, filter corners, sample rate.
+        settings: settings of the front end; default: those of the board's file.
+        rng: random generator of a board's constants: mismatch, leakage, mount echoes. Default: board number 0.
 
     Attributes:
         channel: complex gain of each channel.
@@ -62,10 +62,10 @@ class FrontEnd:
         echoes = [self._draw_mount(echo, rng)[enabled] for echo in self.settings.mount or ()]
         self.mount = np.array(echoes, complex).reshape(-1, *self.leakage.shape)
         self._bins = np.arange(config.samples) * config.sample_rate / config.samples
-        self._skirts = None
+        self._sidebands = None
         if self.settings.phase_noise:
             response = np.abs(self.beat_response(self._bins))
-            self._skirts = Skirts(config, self.settings.phase_noise, response)
+            self._sidebands = Sidebands(config, self.settings.phase_noise, response)
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -163,14 +163,14 @@ class FrontEnd:
     def receive(
         self, signal: Complex[np.ndarray, "loop tx rx sample"], rng: np.random.Generator
     ) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """What arrives at the converter, in counts; arguments as for `digitize`."""
+        """Signal at the input of the converter, in counts; arguments as for `digitize`."""
         echoes = self._amplify(signal)
         extra = self._thermal(echoes.shape, rng)
-        if self._skirts or self.settings.image_rejection_db is not None:
+        if self._sidebands or self.settings.image_rejection_db is not None:
             bins = scipy.fft.fft(echoes, axis=-1, norm="forward")
-        if self._skirts:
+        if self._sidebands:
             noise = self._bin_noise if self.settings.noise else 0.0
-            extra += self._skirts(bins, *self._static, noise, rng)
+            extra += self._sidebands(bins, *self._static, noise, rng)
         leakage = self._coupled
         if (rejection := self.settings.image_rejection_db) is not None:
             extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra, rejection)
@@ -183,7 +183,7 @@ class FrontEnd:
         steps = np.clip(np.rint(iq / np.float32(step)), -32768 // step, 32767 // step)
         return (steps * step).astype(np.int16).reshape(*counts.shape, 2)
 
-    def by_cause(
+    def by_path_type(
         self, signals: list[Complex[np.ndarray, "loop tx rx sample"]]
     ) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
         """Counts that each of several signals makes without noise and converter, and last those of leakage and mount.
@@ -233,7 +233,7 @@ class FrontEnd:
     def _image(
         self, bins: Complex[np.ndarray, "*trace sample"], rejection: float
     ) -> Complex[np.ndarray, "*trace sample"]:
-        """Image of bin b at -b, so many dB down, as far as the decimation filter lets it through; -b is bin N - b."""
+        """Image of bin b at -b, `rejection` dB below it, within the decimation filter's band; -b is bin N - b."""
         passed = 10 ** (-rejection / 20) * self._decimation(-self._bins)
         # conj(x(t)) has the conjugate coefficients in mirrored order
         image = np.zeros_like(bins)

@@ -1,6 +1,6 @@
-"""Settings of the front end. Each board's file has its own (`radarize.radar.boards`); a front-end file changes some.
+"""Settings of the front end. Each board's file has its own (`radarize.radar.boards`); a front-end file overrides some.
 
-Every effect can be switched off by itself (`null`, `false`), and `FrontEndConfig.ideal()` has none.
+Every effect can be switched off (`null`, `false`); `FrontEndConfig.ideal()` has none.
 """
 
 from collections.abc import Sequence
@@ -34,12 +34,12 @@ class Channel(Frozen):
 
     @property
     def factor(self) -> complex:
-        """As a complex amplitude."""
+        """Complex amplitude of the channel."""
         return 10 ** (self.gain_db / 20) * np.exp(1j * np.deg2rad(self.phase_deg))
 
     @classmethod
     def of(cls, factor: complex) -> "Channel":
-        """From a complex amplitude, rounded to what a reader wants to see."""
+        """Convert a complex amplitude, rounded for readers."""
         return cls(
             gain_db=round(20 * np.log10(max(abs(factor), 1e-20)), 3), phase_deg=round(np.rad2deg(np.angle(factor)), 2)
         )
@@ -55,10 +55,10 @@ class _PerChannel(Frozen):
     channels: tuple[Channel, ...] | None = None
 
     def measured(self, board: Board, source: str = "front end") -> Complex[np.ndarray, "tx rx"]:
-        """`channels` as complex amplitudes; `source` is what errors name as their origin.
+        """`channels` as complex amplitudes; `source` names their origin in error messages.
 
         Raises:
-            InputError: they are not as many as the board's.
+            InputError: their number differs from the board's.
         """
         tx, rx = len(board.tx), len(board.rx)
         channels = self.channels or ()
@@ -73,8 +73,8 @@ class _PerChannel(Frozen):
 class Mismatch(_PerChannel):
     """Gain and phase errors of the channels.
 
-    A channel's factor is its transmitter's times its receiver's, each drawn from the seed within half the bounds, as
-    the errors of a real board are: all echoes of a TX share its error.
+    A channel's factor is the product of its transmitter's and its receiver's, each drawn from the seed within half the
+    bounds, as on a real board: all channels of a TX share its error.
 
     Attributes:
         gain_db: bound of a channel's gain error, dB (data sheet SWRS228: 0.5 dB over temperature).
@@ -89,7 +89,8 @@ class Mismatch(_PerChannel):
 class Leakage(_PerChannel):
     """Leakage from TX to RX on the board: one static echo at almost zero range.
 
-    The default lies within what `radarsim calibrate` finds in three public captures of two boards: -42, -47 and -49 dB
+    The default lies within the results of `radarsim calibrate` on three public captures of two boards: -42, -47 and -49
+        dB
     at 0.42, 0.36 and 0.69 ns.
 
     Attributes:
@@ -103,10 +104,11 @@ class Leakage(_PerChannel):
 
 
 class MountEcho(_PerChannel):
-    """A static echo of the radar's own housing, radome or mount, which moves with it.
+    """Static echo of the radar's own housing, radome or mount.
 
-    Several edges add up in it: `radarsim calibrate` finds no plane wave in the echoes of public captures, and levels of
-    the channels that spread as those of independent complex normal amplitudes.
+    It is a sum over several edges: in the echoes of public captures `radarsim calibrate` finds no plane wave, and
+        channel
+    levels that spread like those of independent complex normal amplitudes.
 
     Attributes:
         distance: distance of the echo, m.
@@ -119,7 +121,7 @@ class MountEcho(_PerChannel):
 
     @property
     def delay(self) -> float:
-        """Out and back, s."""
+        """Round-trip delay, s."""
         return 2 * self.distance / SPEED_OF_LIGHT
 
 
@@ -172,7 +174,7 @@ class Band(Frozen):
         return np.interp(x, [self.low, 0.0, self.flat, self.high], [0.0, 1.0, 1.0, 0.0])
 
     def noise(self, x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-        """Power of white noise that is sampled behind the filter, over what it is before: all aliases add up."""
+        """Power of white noise sampled after the filter, relative to its power before: the sum over all aliases."""
         aliases = np.arange(np.floor(self.low) - 1, np.ceil(self.high) + 1)
         return np.sum(self.response(np.add.outer(aliases, x)) ** 2, axis=0)
 
@@ -224,10 +226,10 @@ class FrontEndConfig(Frozen):
 
     @classmethod
     def of(cls, board: str | Board, **changes: object) -> "FrontEndConfig":
-        """The front end in a board's file, with changes; of its parts (`leakage={"delay": 1e-9}`), those given.
+        """Return the front end of a board's file with changes; nested settings (`leakage={"delay": 1e-9}`) are merged.
 
         Raises:
-            InputError: unknown or impossible value, in the file or the changes; with the field.
+            InputError: unknown or impossible value, in the file or the changes, with the field's name.
         """
         board = load_board(board)
         settings = cls.build(f"{board.name}.yaml: front_end", board.front_end)
@@ -235,7 +237,7 @@ class FrontEndConfig(Frozen):
 
     @classmethod
     def ideal(cls, board: str | Board = "iwr1843boost", **changes: object) -> "FrontEndConfig":
-        """Nothing but a board's power and a 16-bit converter, with `changes`."""
+        """Front end with a board's power and a 16-bit converter only, with `changes`."""
         off = {"noise": False, "leakage": None, "mount": None, "mismatch": None, "phase_noise": None}
         return cls.of(
             board, **{"high_pass": False, "antenna": None, "band": None, "image_rejection_db": None, **off, **changes}
@@ -243,11 +245,11 @@ class FrontEndConfig(Frozen):
 
     @property
     def pattern(self) -> Antenna:
-        """The antenna pattern, isotropic where it is switched off."""
+        """Antenna pattern, isotropic if it is switched off."""
         return self.antenna or ISOTROPIC
 
     def noise_factor(self, gain_db: float) -> float:
-        """Noise factor (linear) at a receive gain, dB; never below 1."""
+        """Noise factor (linear) at a receive gain in dB; at least 1."""
         gains = np.array(list(self.noise_figure_db))
         factors = 10 ** (np.array(list(self.noise_figure_db.values())) / 10)
         line = np.polyfit(10 ** (-gains / 10), factors, min(1, len(gains) - 1))
@@ -255,10 +257,10 @@ class FrontEndConfig(Frozen):
 
     @classmethod
     def load(cls, path: str | Path, board: str | Board) -> "FrontEndConfig":
-        """Read a front-end file; what it does not name is the board's.
+        """Read a front-end file; missing settings are the board's.
 
         Raises:
-            InputError: unreadable, malformed YAML, unknown or impossible value; with file and field.
+            InputError: unreadable, malformed YAML, unknown or impossible value, with file and field.
         """
         data = read_yaml(path)
         if not isinstance(data, dict | None):
@@ -271,10 +273,10 @@ class FrontEndConfig(Frozen):
 
     @classmethod
     def build(cls, source: str, fields: dict[str, object]) -> "FrontEndConfig":
-        """Settings from their fields; `source` is what errors name as their origin.
+        """Build settings from fields; `source` names their origin in error messages.
 
         Raises:
-            InputError: unknown or impossible value; with the field.
+            InputError: unknown or impossible value, with the field's name.
         """
         try:
             return cls.model_validate(fields)
@@ -282,7 +284,7 @@ class FrontEndConfig(Frozen):
             raise InputError(f"{source}: {format_validation_error(error, fields)}") from error
 
     def save(self, path: Path, remarks: Sequence[str] = ()) -> None:
-        """Write as a front-end file, with remarks as comments on top."""
+        """Write a front-end file, with remarks as comments on top."""
         text = "".join(f"# {remark}\n" for remark in remarks) + yaml.safe_dump(
             self.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120
         )

@@ -1,7 +1,7 @@
-"""What other radars send into a radar's receivers: chirps that cross its IF band.
+"""Interference: chirps of other radars that cross the IF band of the receiver.
 
-The radar mixes what arrives with its own ramp. With t from that ramp's start, and l(t) what the other radar's clock
-showed within its ramp when the wave left, the mixer gives
+The radar mixes received signals with its own ramp. With t from that ramp's start, and l(t) the time within the other
+radar's ramp, by its own clock, at which the wave was sent, the mixer output is
 
     x(t) = a exp(j 2 pi [ f t + S t^2 / 2  -  f' l - S' l^2 / 2 ]),      a^2 = G G' (lambda / 4 pi d)^2  (Friis),
 
@@ -11,8 +11,8 @@ error are), so is the frequency, and the spectrum of such a piece is a differenc
 filter is a product with it, and the samples are its transform: nothing is sampled at a higher rate, and a crossing
 shorter than a sample comes out as the filter's response to it.
 
-The straight path counts, with what stands in its way; reflections of what others send do not. Every ramp begins with
-phase 0, by either radar's clock.
+Only the straight path between the radars counts, with obstacles on it; reflections of interference are not modelled.
+Every ramp begins with phase 0, by either radar's clock.
 """
 
 from typing import NamedTuple
@@ -33,9 +33,10 @@ from radarsim.propagation.obstacles import Obstacles
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.world.interferers import Interferer
 
-#: A chirp counts that comes so near to the band, in units of how wide its own ends blur it: they are 36 dB down there.
+#: Distance from the band within which a chirp counts, in units of the spread of its own ends, which are 36 dB down
+#: there.
 _NEAR = 10.0
-#: Cycles by which a chirp may leave a tone's phase and count as one.
+#: Largest phase deviation (cycles) at which a chirp is treated as a tone.
 _TONE = 1e-4
 
 
@@ -47,11 +48,11 @@ class Sweeps(NamedTuple):
     end: Float[np.ndarray, "*n"]
 
     def mirrored(self) -> "Sweeps":
-        """Their complex conjugates."""
+        """Complex conjugates of the sweeps."""
         return self._replace(phase=-self.phase)
 
     def entering(self, low: float, high: float) -> Bool[np.ndarray, "*n"]:
-        """Which last, and come near a band, Hz."""
+        """Mask of sweeps that have a duration and come near a band, Hz."""
         first, last = (self.phase[..., 1] + self.phase[..., 2] * t for t in (self.begin, self.end))
         lasting = self.end > self.begin
         duration = np.where(lasting, self.end - self.begin, 1.0)
@@ -59,15 +60,15 @@ class Sweeps(NamedTuple):
         return lasting & (np.minimum(first, last) < high + near) & (np.maximum(first, last) > low - near)
 
     def at(self, rows: Bool[np.ndarray, "*n"]) -> "Sweeps":
-        """Some of them."""
+        """Select some sweeps."""
         return Sweeps(self.phase[rows], self.begin[rows], self.end[rows])
 
     def spectrum(self, f: Float[np.ndarray, "bin"]) -> Complex[np.ndarray, "n bin"]:
-        """Fourier integrals at frequencies, Hz: Fresnel integrals from end to end, sinc functions of mere tones."""
+        """Fourier integrals at frequencies, Hz: Fresnel integrals from end to end, sinc functions for tones."""
         middle, half = (self.begin + self.end) / 2, (self.end - self.begin) / 2
         p0, p1, p2 = self.phase.T
         cycles = p0 + middle * (p1 + middle * p2 / 2)
-        away = (p1 + middle * p2)[:, None] - f  # of the sweep's middle from the frequency
+        away = (p1 + middle * p2)[:, None] - f  # frequency offset of the sweep's middle
         out = np.empty(away.shape, complex)
         bent = np.abs(p2) * half**2 / 2 > _TONE
         width = 2 * half[~bent, None]
@@ -81,30 +82,31 @@ class Sweeps(NamedTuple):
 
 
 class Interference:
-    """The signal that other radars make.
+    """Signal of other radars at the receiver.
 
     Args:
         interferers: the other radars.
-        board: of the radar that they disturb.
-        obstacles: what stands between them.
+        board: front end of the disturbed radar.
+        obstacles: obstacles between the radars.
     """
 
     def __init__(self, interferers: list[Interferer], board: FrontEnd, obstacles: Obstacles):
         self.interferers, self.board, self.obstacles, self.config = interferers, board, obstacles, board.config
         config, (low, high) = self.config, board.passband
         self._pattern = gain_pattern(board.settings.pattern)
-        # A spectrum of lines is of a signal that repeats: after twice a ramp, in which the filters' response dies away.
+        # A line spectrum is that of a periodic signal: the period is twice a ramp, in which the filters' response
+        # decays.
         count = scipy.fft.next_fast_len(int(np.ceil(2 * config.ramp_end_time * config.sample_rate)))
         step = config.sample_rate / count
         self._bins = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
         at = config.adc_start_time + np.arange(config.samples) / config.sample_rate
         self._response = board.beat_response(self._bins)
         self._transform = (step * np.exp(2j * np.pi * self._bins[:, None] * at)).astype(np.complex64)
-        # It came in by the receivers: what transmitters add to the channels is not in it.
+        # Interference enters at the receivers: the transmitters' part of the channel gains is not in it.
         self._receivers = (board.channel[0] / board.channel)[..., None]
 
     def __call__(self, motion: Motion, time: float) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """What they add to the signal of the frame that starts at `time`, in the unit of `FrontEnd.receive`."""
+        """Interference in the frame that starts at `time`, in the unit of `FrontEnd.receive`."""
         config = self.config
         loops, tx, rx, samples, _ = config.frame_shape
         out = np.zeros((loops * tx, rx, samples), np.complex64)
@@ -114,7 +116,7 @@ class Interference:
             sweeps = self._sweeps(other, motion, time)
             self._add(sweeps, amplitude * self._response, out)
             if (rejection := self.board.settings.image_rejection_db) is not None:
-                # The mixer's image of what passes below zero; `FrontEnd.receive` makes that of what is above.
+                # The mixer's image of signals below zero; `FrontEnd.receive` adds the image of those above.
                 above = self._response * (self._bins > 0)
                 self._add(sweeps.mirrored(), amplitude.conjugate() * 10 ** (-rejection / 20) * above, out)
         return out.reshape(loops, tx, rx, samples) * self._receivers.astype(np.complex64)
@@ -122,7 +124,7 @@ class Interference:
     def _add(
         self, sweeps: Sweeps, response: Complex[np.ndarray, "bin"], out: Complex[np.ndarray, "chirp rx sample"]
     ) -> None:
-        """Add the samples of sweeps (chirp, candidate, rx) that a response lets through."""
+        """Add the samples of sweeps (chirp, candidate, rx) that a response passes."""
         for candidate in range(sweeps.begin.shape[1]):
             some = Sweeps(*(each[:, candidate] for each in sweeps))
             rows = some.entering(self._bins[0], self._bins[-1])
@@ -130,14 +132,14 @@ class Interference:
                 out[rows] += (some.at(rows).spectrum(self._bins) * response).astype(np.complex64) @ self._transform
 
     def _amplitudes(self, motion: Motion, time: float) -> list[complex]:
-        """Of each, square root of its power at an RX over the power that the disturbed radar transmits, in the middle
-        of the burst."""
+        """Amplitude of each radar: square root of its power at an RX over the power that the disturbed radar transmits,
+        in the middle of the burst."""
         middle = np.array([time + self.config.burst_center])
         here, rotation = motion.position(middle), motion.rotation(middle).as_matrix()
         there = np.array([other.places(middle[0]) for other in self.interferers])
         observation = Observation(here, rotation, middle, np.inf, self.config.wavelength, 0.0, *self._pattern)
         n = len(there)
-        # Slabs' delays, some ps, do not matter: nobody knows the phases of another radar.
+        # Delays by slabs, some ps, are irrelevant: the phases of another radar are arbitrary.
         passed = self.obstacles.passage(
             observation, np.zeros(n, int), np.repeat(here, n, axis=0), there, np.ones(n, bool)
         )
@@ -149,8 +151,8 @@ class Interference:
         return found
 
     def _sweeps(self, other: Interferer, motion: Motion, time: float) -> Sweeps:
-        """Chirps that the mixer makes of another radar's in each of the frame's (in order of loop and tx), for each of
-        the other's that may fall into it, and each rx."""
+        """Chirps at the mixer's output: another radar's in each of the frame's chirps (in order of loop and tx), for
+        each candidate of the other's chirps that may fall into it, and each rx."""
         config, theirs, rate = self.config, other.radar, 1 + 1e-6 * other.clock_ppm
         own = time + (config.chirp_times.ravel() - config.adc_center_time)  # start of each ramp, s
         ends = own[:, None] + [0, config.ramp_end_time]
@@ -159,7 +161,7 @@ class Interference:
         slot = number % (theirs.loops * len(theirs.tx_order)) % len(theirs.tx_order)
         sender = np.array(theirs.turn)[slot]
         late, later = (np.take_along_axis(length[:, k], sender[..., None], axis=1) for k in (0, 1))
-        # Their clock within their ramp is l = begun + pace t.
+        # Time within the other radar's ramp, by its clock: l = begun + pace t.
         pace = rate * (1 - (later - late) / config.ramp_end_time)
         begun = rate * (own[:, None, None] - other.start - late) - ramp[..., None]
         phase = np.stack([
@@ -175,10 +177,10 @@ class Interference:
 def _chirps(
     theirs: RadarConfig, time: Float[np.ndarray, "chirp"], duration: float
 ) -> tuple[Int[np.ndarray, "chirp candidate"], Float[np.ndarray, "chirp candidate"]]:
-    """Numbers of a radar's chirps that may be sent within a duration after each time, and starts of their ramps.
+    """Candidates of a radar's chirps within a duration after each time: their numbers and ramp starts.
 
     Args:
-        time: s, by that radar's clock since its first frame; chirps before that have negative numbers.
+        time: s, by that radar's clock since its first frame; earlier chirps have negative numbers.
         duration: s.
 
     Returns:
@@ -202,7 +204,7 @@ def _chirps(
 def _lengths(
     config: RadarConfig, other: Interferer, motion: Motion, times: Float[np.ndarray, "chirp end"]
 ) -> Float[np.ndarray, "chirp end tx rx"]:
-    """From another radar's transmitters to the receivers at times, s: (chirp, end, their tx, rx), m."""
+    """Path lengths from another radar's transmitters to the receivers at times, s: (chirp, end, their tx, rx), m."""
     t = times.ravel()
     rx = motion.position(t)[:, None] + rx_positions(config) @ motion.rotation(t).as_matrix().transpose(0, 2, 1)
     tx = other.places(t)[:, None] + tx_positions(other.radar) @ other.rotation.T
@@ -212,8 +214,8 @@ def _lengths(
 
 @njit(cache=True)
 def _link(there, rotation, other, pattern):
-    """Amplitude gains of both antennas along the line to the other, over its length, 1/m; of the field, what is upright
-    to both."""
+    """Amplitude gains of both antennas along the line between them, over its length, 1/m, for the field component
+    vertical in both antennas' frames."""
     way = vec(there)
     towards, back = unit(way), unit(minus((0.0, 0.0, 0.0), way))
     shared = dot(upright(upwards(rotation), towards), upright(upwards(other), towards))

@@ -1,13 +1,13 @@
-"""Phase noise after dechirping: strong echoes stand on a skirt, the higher the farther they are.
+"""Phase-noise sidebands after dechirping: they surround strong echoes and grow with their distance.
 
-Receiver and transmitter share one oscillator of phase phi(t), so an echo of delay tau keeps phi(t) - phi(t - tau).
+Receiver and transmitter share one oscillator of phase phi(t), so an echo of delay tau retains phi(t) - phi(t - tau).
 With Fourier coefficients Theta of phi over the ADC window, the echo that fills bin k with S_k adds to bin m
 
     j S_k Theta_(m-k) (1 - exp(-j 2 pi f tau_k)),  f = (m - k) f_s / N,  tau_k = k / B,
 
 whose power is 4 L(f) sin^2(pi f tau): nothing for near echoes (range correlation; Budge and Burt, "Range correlation
-effects in radars", 1993). All channels of a chirp see the same Theta; chirps are independent, for whatever is slower
-than a chirp cancels over delays of tens of nanoseconds.
+effects in radars", 1993). All channels of a chirp have the same Theta; chirps are independent, because slower phase
+fluctuations cancel over delays of tens of nanoseconds.
 """
 
 import numpy as np
@@ -17,17 +17,17 @@ from numba import njit, prange
 from radarize.radar.config import RadarConfig
 from radarsim.receiver.frontend_config import PhaseNoise
 
-#: Cells whose skirt peaks this far (power) below the thermal noise are left out.
+#: Cells whose sidebands peak at this ratio (power) to the thermal noise or lower are left out.
 NEGLIGIBLE = 0.01
 
 
-class Skirts:
-    """Adds the skirts of all range cells.
+class Sidebands:
+    """Phase-noise sidebands of all range cells.
 
     Args:
         config: radar configuration.
         mask: phase noise.
-        response: amplitude response of the IF chain at each bin; it shapes the skirts as well.
+        response: amplitude response of the IF chain at each bin; it filters the sidebands as well.
     """
 
     def __init__(self, config: RadarConfig, mask: PhaseNoise, response: Float[np.ndarray, "sample"]):
@@ -35,10 +35,10 @@ class Skirts:
         step = config.sample_rate / n
         offset = step * np.arange(-(n - 1), n)
         self._level = np.sqrt(density(mask, config.center_frequency, np.abs(offset)) * step)
-        self._level[n - 1] = 0  # a constant phase is no skirt
+        self._level[n - 1] = 0  # a constant phase has no sidebands
         cell = np.arange(n)
         apart = step * (cell[None, :] - cell[:, None])  # from cell k (row) to bin m
-        # An echo in cell k has been through the filter at k, its skirt goes through it at m.
+        # An echo in cell k has passed the filter at k, its sidebands pass it at m.
         shape = np.minimum(1, response[None, :] / np.maximum(response[:, None], 1e-6))
         self._difference = (1 - np.exp(-2j * np.pi * apart * (cell / config.bandwidth)[:, None])) * shape
         spread = np.stack([self._level[n - 1 - k : 2 * n - 1 - k] for k in range(n)])
@@ -56,17 +56,17 @@ class Skirts:
         noise: float,
         rng: np.random.Generator,
     ) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """Skirts, by bin.
+        """Return the sidebands by frequency bin.
 
         Args:
             bins: Fourier coefficients of the signal without the static echoes.
             static: amplitudes of the leakage and other static echoes before the high-pass filter.
             delays: of those, s.
             noise: power of thermal noise per bin; 0: none.
-            rng: for the oscillator.
+            rng: random generator of the oscillator's phase.
         """
         loops, tx, rx, n = bins.shape
-        # phi is real: Theta of opposite offsets are conjugates.
+        # phi is real: Theta at opposite offsets are complex conjugates.
         draw = rng.standard_normal((loops * tx, n - 1, 2), dtype=np.float32).view(np.complex64)[..., 0] * np.sqrt(0.5)
         theta = np.zeros((loops * tx, 2 * n - 1), np.complex64)
         theta[:, n:] = draw
@@ -77,14 +77,14 @@ class Skirts:
         near = (1 - np.exp(-2j * np.pi * np.outer(delays, self._offset[n - 1 :]))) * self._response
         near = np.einsum("etr,em->trm", static, near)
         out += np.tile(near, (loops, 1, 1)) * theta[:, None, n - 1 :]
-        _add_skirts(bins.reshape(loops * tx, rx, n), theta, self._difference, weakest, out)
+        _add_sidebands(bins.reshape(loops * tx, rx, n), theta, self._difference, weakest, out)
         return out.reshape(bins.shape)
 
 
 def density(mask: PhaseNoise, carrier: float, offset: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    """Single-sideband noise over carrier, 1/Hz, at offsets in Hz."""
+    """Single-sideband noise relative to the carrier, 1/Hz, at offsets in Hz."""
     logarithm = np.log10(np.maximum(offset, 1.0))
-    # The last slope goes on beyond the mask.
+    # The mask's last slope is extrapolated.
     x, y = np.log10(mask.offset_hz), np.array(mask.dbc_hz)
     level = np.interp(logarithm, x, y)
     if len(x) > 1:
@@ -94,7 +94,7 @@ def density(mask: PhaseNoise, carrier: float, offset: Float[np.ndarray, "*n"]) -
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _add_skirts(bins, theta, difference, weakest, out):
+def _add_sidebands(bins, theta, difference, weakest, out):
     """out[chirp, rx, m] += sum over cells k of bins[chirp, rx, k] theta[chirp, m - k] difference[k, m]."""
     chirps, rx, n = bins.shape
     for c in prange(chirps):
@@ -105,8 +105,8 @@ def _add_skirts(bins, theta, difference, weakest, out):
                 strongest = max(strongest, s.real * s.real + s.imag * s.imag)
             if strongest <= weakest[k]:
                 continue
-            skirt = theta[c, n - 1 - k : 2 * n - 1 - k] * difference[k]
+            sidebands = theta[c, n - 1 - k : 2 * n - 1 - k] * difference[k]
             for r in range(rx):
                 s = bins[c, r, k]
                 for m in range(n):
-                    out[c, r, m] += s * skirt[m]
+                    out[c, r, m] += s * sidebands[m]

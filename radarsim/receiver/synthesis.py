@@ -1,4 +1,4 @@
-"""From echoes to the beat signal of one burst, phases exact for every chirp, TDM slot and antenna.
+"""Synthesis of a burst's beat signal from echoes, with exact phases for every chirp, TDM slot and antenna.
 
 The beat signal of virtual antenna (k, r), loop l, sample n is a sum over echoes e with path length L (out and back),
 
@@ -30,12 +30,12 @@ from scipy.special import jv
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.propagation.burst import BurstClock
 
-#: Loops that are summed side by side, in the width of the processor's registers.
+#: Loops summed together in the processor's SIMD registers.
 LANES = 16
 
 
 class Synthesizer:
-    """Turns path-length parabolas and amplitudes into the beat signal of a burst.
+    """Synthesizer of the beat signal of a burst from path-length parabolas and amplitudes.
 
     Args:
         config: radar configuration.
@@ -55,7 +55,7 @@ class Synthesizer:
             wavenumber=config.center_frequency / SPEED_OF_LIGHT, video=config.slope / (2 * SPEED_OF_LIGHT**2),
         )  # fmt: skip
         n = config.samples
-        # Of the instants v = -1...1 within the window, those of the upper half and the middle.
+        # Sample instants v = -1...1 within the window: the upper half and the middle.
         self._v = (np.arange(n // 2, n) - (n - 1) / 2) / (n / 2)
         self._dft = np.exp(1j * np.pi * np.arange(n) * self._v[:, None]).astype(np.complex64)
 
@@ -87,7 +87,7 @@ class Synthesizer:
         return self._samples(moments, np.pi * width)
 
     def _orders(self, x: float) -> int:
-        """Terms after which the rest of the Jacobi-Anger series is below `accuracy`."""
+        """Number of terms after which the remainder of the Jacobi-Anger series is below `accuracy`."""
         orders = np.arange(1, 200)
         return int(orders[2 * np.abs(jv(orders, x)) + 2 * np.abs(jv(orders + 1, x)) < self.accuracy][0])
 
@@ -97,7 +97,7 @@ class Synthesizer:
         p = np.arange(orders)
         basis = np.where(p == 0, 1, 2) * 1j**p * jv(p, x * self._v[:, None])  # sample, order
         # One matrix product: the transform over cells and the sum over orders are both sums over (cell, order). The
-        # kernel at -v is the conjugate of that at v, so its real and its imaginary part do for both halves.
+        # kernel at -v is the conjugate of that at v, so real and imaginary parts at v >= 0 give both halves.
         kernel = (self._dft[:, :, None] * basis[:, None, :].astype(np.complex64)).reshape(-1, n * orders)
         parts = np.concatenate([kernel.real, kernel.imag]) @ moments.reshape(n * orders, -1)
         real, imaginary = parts.view(np.complex64).reshape(2, len(kernel), tx, rx, loops)
@@ -123,10 +123,10 @@ class _Axes(NamedTuple):
 
 @njit(parallel=True, cache=True)
 def _waves(lengths, amplitudes, axes):
-    """Cell of each echo; parabolas in the loop number, of its phase (cycles) and of its tone from that cell (bins), by
-    echo, coefficient (three of either) and antenna; and how far from it the tone gets.
+    """Cell of each echo; parabolas over the loop number of its phase (cycles) and of its tone relative to the cell
+    (bins), by echo, coefficient (three of each) and antenna; and the largest distance of a tone from its cell.
 
-    Cells repeat after N bins, but phases are referred to the instant n_c = (N - 1) / 2, where a tone N bins higher has
+    Cells repeat after N bins, but phases refer to the instant n_c = (N - 1) / 2, at which a tone N bins higher has
     turned n_c cycles further.
     """
     echoes, virtual, _ = lengths.shape
@@ -144,7 +144,7 @@ def _waves(lengths, amplitudes, axes):
         for a in range(virtual):
             c0, c1, c2 = lengths[e, a, 0], lengths[e, a, 1], lengths[e, a, 2]
             s = axes.start[a]
-            # The residual video phase is as good as straight over a burst. float64 only for the part that is large.
+            # The residual video phase is nearly linear over a burst. float64 only for the large part of the phase.
             wavenumber = axes.wavenumber - 2 * axes.video * c0
             p0 = turn + axes.video * c0 * c0 + wavenumber * (c0 + s * (c1 + s * c2))
             waves[e, 0, a] = p0 - np.floor(p0)
@@ -166,13 +166,14 @@ def _waves(lengths, amplitudes, axes):
 def _accumulate(moments, edges, order, sizes, waves, scale, series):
     """moments[cell, p, antenna, loop] += A exp(j phase) T_p(u), over the echoes of each cell.
 
-    `series` is as long as there are orders: a tuple's length is known when this is compiled, so all orders of some
-    loops stay in registers.
+    `series` is a tuple with one entry per order: its length is known at compilation, so all orders of a few loops stay
+        in
+    registers.
     """
     n, orders, virtual, loops, _ = moments.shape
     blocks = -(-loops // LANES)
     for i in prange(n):
-        # Threads get contiguous ranges of i; near cells hold few echoes, so deal the cells out alternately.
+        # Threads get contiguous ranges of i; near cells hold few echoes, so cells are distributed alternately.
         cell = 2 * i if 2 * i < n else 2 * (i - (n + 1) // 2) + 1
         if edges[cell] == edges[cell + 1]:
             continue
@@ -193,7 +194,7 @@ def _accumulate(moments, edges, order, sizes, waves, scale, series):
 
 @njit(inline="always", fastmath=True)
 def _add(acc, first, wave, tone, series):
-    """One echo at one antenna in some loops: what it adds to all orders' real and imaginary parts."""
+    """Add one echo at one antenna in some loops to the real and imaginary parts of all orders."""
     size, p0, p1, p2 = wave
     u0, u1, u2 = tone
     for lane in range(LANES):

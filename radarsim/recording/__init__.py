@@ -1,1 +1,1 @@
-"""Recordings made of scenarios: batches of frames by processes, resume, sensors added later."""
+"""Simulated recordings: batches of frames by several processes, resume, sensors added later."""

@@ -1,4 +1,4 @@
-"""Sensors that a simulated recording gets afterwards."""
+"""Sensors added to an existing simulated recording."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,28 +11,28 @@ from radarsim.recording.batches import Batches
 from radarsim.scenario import Scenario
 from radarsim.sensors.suite import Suite
 
-_SAME = 1e-6  # m, by which a motion that is planned anew may differ
+_SAME = 1e-6  # m, tolerance of a motion that is planned again
 
 
-def accompany(
+def add_sensors(
     path: Path,
     scenario: Scenario,
     sensors: Sequence[str],
     attributes: Mapping[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Add what sensors would have measured to a recording that was made without them: the same values as if they had
-    been there. Only those that look at the radar's echoes or samples have these simulated anew.
+    """Add sensors to a recording, with the values that they would have had from the start. Radar echoes or samples are
+    simulated again only for sensors that use them.
 
     Args:
-        path: recording, replaced as a whole.
-        scenario: that was recorded.
+        path: recording; replaced by a new file.
+        scenario: scenario of the recording.
         sensors: names from `radarsim.sensors.suite.SENSORS`.
-        attributes: of the file, to replace or add.
-        progress: called with (frames done, frames in all).
+        attributes: attributes of the file to replace or add.
+        progress: called with (frames done, total frames).
 
     Raises:
-        InputError: the motion is not the recording's any more, or the disk is full.
+        InputError: the motion differs from the recording's, or the disk is full.
     """
     with Recording(path) as recording:
         times = recording.times
@@ -40,7 +40,7 @@ def accompany(
         if np.abs(apart).max() > _SAME:
             raise InputError(
                 f"{path}: its tour differs by {np.abs(apart).max():.3g} m from what this version plans, expected the "
-                "same; --replace makes it anew"
+                "same; --replace makes the recording again"
             )
     suite, batches, rows = Suite(scenario, sensors), Batches(scenario, times), []
     for first, last in batches.spans():

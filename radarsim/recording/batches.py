@@ -1,4 +1,4 @@
-"""Frames of a recording with what sensors see beside the radar, some at a time: made here, or by several processes."""
+"""Batches of a recording's frames with the rows of all sensors, made in this process or in several."""
 
 import pickle
 from collections import deque
@@ -16,14 +16,14 @@ from radarsim.machine.threads import default_workers, share_with_drjit
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.suite import Suite
 
-#: Frames that are made together, which is quicker: ray tests and loops over scatterers go well in large numbers.
+#: Frames per batch: ray tests and loops over scatterers are faster for many frames together.
 TOGETHER = 16
-#: Fewest batches a process for which its start, some seconds, pays; used where the user gives no number.
+#: Smallest number of batches per process that is worth its start, some seconds; used if no number is given.
 _WORTH = 8
 
 
 class Batch(NamedTuple):
-    """I/Q of some frames, zero where chirps are lost, and rows of all sensors' streams."""
+    """I/Q of a batch's frames, zero where chirps are lost, and rows of all sensors' streams."""
 
     samples: Int16[np.ndarray, "frame loop tx rx sample 2"]
     rows: dict[str, np.ndarray]
@@ -31,13 +31,13 @@ class Batch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Batches:
-    """The frames of a recording.
+    """Frames of a recording, computed in batches.
 
     Attributes:
-        scenario: that is recorded.
-        times: of the frames' starts on the clock of the motion, s.
-        start: stamp of that clock's zero, s.
-        valid: False where a chirp is lost; None: none is.
+        scenario: scenario that is recorded.
+        times: start times of the frames on the clock of the motion, s.
+        start: time stamp of that clock's zero, s.
+        valid: False where a chirp is lost; None: no chirp is lost.
     """
 
     scenario: Scenario
@@ -47,27 +47,27 @@ class Batches:
 
     @classmethod
     def of(cls, scenario: Scenario) -> "Batches":
-        """All frames of a scenario.
+        """Return all frames of a scenario.
 
         Raises:
-            InputError: its motion is shorter than one.
+            InputError: its motion is shorter than a frame.
         """
         return cls(scenario, scenario.times)
 
     @cached_property
     def suite(self) -> Suite:
-        """The sensors."""
+        """Sensors of the recording."""
         return Suite(self.scenario)
 
     def frames(self, first: int, last: int) -> Frames:
-        """Frames first to last - 1, nothing of them computed yet."""
+        """Return frames first to last - 1; nothing is computed yet."""
         return self.scenario.frames(self.times[first:last], self.times[last] if last < len(self.times) else None)
 
     def made(self, first: int, last: int) -> Batch:
-        """Samples and rows of frames first to last - 1.
+        """Compute samples and rows of frames first to last - 1.
 
         Raises:
-            InputError: the recording is to begin with them, and none of its frames has an echo.
+            InputError: they are the first of the recording, and none of its frames has an echo.
         """
         frames = self.frames(first, last)
         if first == 0 and not any(map(len, frames.paths)):
@@ -76,26 +76,26 @@ class Batches:
         return Batch(frames.samples * arrived, self.suite.observe(frames, first, self.start))
 
     def spans(self) -> list[tuple[int, int]]:
-        """The first frame of each batch, and the one after its last."""
+        """First frame of each batch, and the frame after its last."""
         frames = len(self.times)
         return [(first, min(first + TOGETHER, frames)) for first in range(0, frames, TOGETHER)]
 
     def each(self, spans: list[tuple[int, int]], workers: int | None = 1) -> Iterator[Batch]:
-        """Batches in the order of their spans.
+        """Yield batches in the order of their spans.
 
         Args:
-            spans: first frames, and those after the last.
-            workers: processes that make them, no more than there are batches; 1: this one does; None: one per core,
-                as far as there is enough for each to do.
+            spans: first frame of each batch, and the frame after its last.
+            workers: number of processes, at most one per batch; 1: this process only; None: one per core, if the number
+                of batches justifies it.
 
         Raises:
-            InputError: as `made`, or a process died.
+            InputError: see `made`, or a process died.
         """
         workers = min(default_workers(), len(spans) // _WORTH) if workers is None else workers
         if min(workers, len(spans)) < 2:
             yield from (self.made(*span) for span in spans)
             return
-        order = pickle.dumps(replace(self))  # without what was computed here
+        order = pickle.dumps(replace(self))  # without cached results
         jobs = {f"frames {first} to {last - 1}": partial(_make, order, first, last) for first, last in spans}
         made, awaited = {}, deque(jobs)
         for news in perform(jobs, workers):
@@ -107,7 +107,7 @@ class Batches:
                 yield made.pop(awaited.popleft())
 
     def _require_echoes(self) -> None:
-        """Refuse a recording without echoes, by frames spread over all of it."""
+        """Raise InputError for a recording without echoes, judged by frames spread over all of it."""
         some = np.unique(np.linspace(0, len(self.times) - 1, TOGETHER).astype(int))
         if not any(map(len, self.scenario.frames(self.times[some]).paths)):
             raise InputError(
@@ -122,6 +122,6 @@ def _make(order: bytes, first: int, last: int, report: Report) -> Batch:
 
 @lru_cache(1)
 def _begun(order: bytes) -> Batches:
-    """The parent's `Batches` in this process."""
+    """The parent's `Batches`, unpickled once per process."""
     share_with_drjit()
     return pickle.loads(order)

@@ -1,4 +1,4 @@
-"""Recordings of scenarios: frame after frame to a file, and on from where a killed run stopped."""
+"""Simulation of a recording: frames are written to a file as they are computed; an interrupted run can be resumed."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +16,7 @@ from radarize.io.recording import Recording, RecordingWriter, spare
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
-from radarsim.motion.pedestrians import crowded
+from radarsim.motion.pedestrians import with_pedestrians
 from radarsim.motion.statistics import Statistics, crossings
 from radarsim.motion.walk import Walk
 from radarsim.receiver.frontend_config import FrontEndConfig
@@ -37,17 +37,17 @@ def simulate(
     """Simulate a recording.
 
     Args:
-        scene: a scene, its YAML file, or the name of one that comes with the project.
+        scene: a scene, its YAML file, or the name of a scene of the project.
         output: recording to write.
-        workers: processes beside this one that make frames, 16 at a time; 1: this one does; None: one per core, fewer
-            where starting them would take longer than they save. A script that asks for more than 1 needs an
-            ``if __name__ == "__main__"``, as whatever starts processes does.
-        progress: called with (frames done, frames in all).
-        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
+        workers: number of processes that compute frames, 16 at a time; 1: this process only; None: one per core, fewer
+            where starting them would take longer than they save. A script that uses more than 1 needs an ``if __name__
+            == "__main__"``, as always with multiprocessing.
+        progress: called with (frames done, total frames).
+        plan: options of the simulation, the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
             trajectory, waypoints, mounting, people.
 
     Returns:
-        the path written.
+        Path of the recording.
 
     Raises:
         InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
@@ -67,21 +67,21 @@ def planned(
     walk_in: Scene | None = None,
     **walk: Any,
 ) -> tuple[Scenario, str, dict[str, object]]:
-    """What `simulate` simulates.
+    """Build the scenario of a simulation.
 
     Args:
-        scene: as there.
-        seed: of the tour, the scatterers and the noise.
+        scene: see `simulate`.
+        seed: seed of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
-        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
-        sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
-            are the same whatever is chosen.
-        people: pedestrians near the radar's path (see `crowded`).
+        frontend: front end or its file (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
+        sensors: sensors beside the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. They do not affect
+            the radar's samples.
+        people: number of pedestrians near the radar's path (see `with_pedestrians`).
         walk_in: scene in which the walk is planned; default: `scene`.
-        walk: how the radar goes, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
+        walk: path of the radar, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
 
     Returns:
-        the scenario, the radar's original configuration text, and attributes of the recording beside `facts`.
+        The scenario, the radar's original configuration text, and attributes of the recording in addition to `facts`.
 
     Raises:
         InputError: unusable scene, configuration, trajectory, way-points or sensor.
@@ -92,7 +92,7 @@ def planned(
     settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(walk_in or world, seed)
-    world = crowded(world, motion, people, seed)
+    world = with_pedestrians(world, motion, people, seed)
     scenario = Scenario(world, motion, config, settings, seed, names)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
     return scenario, cfg_text, about | ({"people": people} if people else {})
@@ -107,18 +107,18 @@ def record(
     workers: int | None = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write a recording of a scenario; what a killed run has left of the very same one is taken over.
+    """Write a recording of a scenario; a partial recording of an interrupted run of the same scenario is continued.
 
     Args:
-        batches: to record.
+        batches: frames to record.
         output: recording to write.
         cfg_text: original configuration text.
-        attributes: of the file, beside those that say what the scenario is, or instead.
-        workers: as `simulate` has them; the bytes are the same.
-        progress: called with (frames done, frames in all).
+        attributes: attributes of the file, in addition to or instead of `facts`.
+        workers: see `simulate`; the bytes do not depend on it.
+        progress: called with (frames done, total frames).
 
     Returns:
-        the path written.
+        Path of the recording.
 
     Raises:
         InputError: the motion is shorter than a frame, none of its frames has an echo, the recording cannot be
@@ -147,8 +147,8 @@ def record(
 
 
 def facts(scenario: Scenario) -> dict[str, object]:
-    """What a recording says of its scenario. The same on the same kind of processor is the same to the bit; on another,
-    compiled loops add up in another order."""
+    """Attributes of a recording that describe its scenario. A recording is reproduced bit for bit on the same kind of
+    processor; on another one, compiled loops sum in another order."""
     others = [each.model_dump(mode="json") for each in scenario.scene.interferers]
     return {
         "source": "radarsim simulate",
@@ -165,7 +165,7 @@ def facts(scenario: Scenario) -> dict[str, object]:
 
 @contextmanager
 def _left_over(output: Path) -> Iterator[Recording | None]:
-    """What killed runs have left of a recording, which is kept beside it until it is whole; None if that is nothing."""
+    """Partial recording of an interrupted run, kept beside the output until it is whole; None if there is none."""
     part, kept = (output.with_name(output.name + suffix) for suffix in (".part", ".begun"))
     if _length(part) > _length(kept):
         part.replace(kept)
@@ -178,7 +178,7 @@ def _left_over(output: Path) -> Iterator[Recording | None]:
 
 
 def _length(path: Path) -> int:
-    """Whole frames in a recording; 0 where there is none."""
+    """Number of whole frames in a recording; 0 if it does not exist."""
     try:
         with Recording(path) as recording:
             return len(recording)
@@ -187,7 +187,7 @@ def _length(path: Path) -> int:
 
 
 def _fits(begun: Recording, batches: Batches, about: Mapping) -> bool:
-    """Whether the frames of a recording are the first of one that is to be made; two of them are made to see."""
+    """Whether a partial recording is the start of the requested one; two of its frames are computed to compare."""
     count = len(begun)
     return (
         begun.config == batches.scenario.config

@@ -1,1 +1,1 @@
-"""Sensors of a recording beside the radar, and truths that no sensor measures."""
+"""Sensors of a recording beside the radar, and ground truth."""

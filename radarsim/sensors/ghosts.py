@@ -1,11 +1,11 @@
 """Path type of each cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, moving objects.
 
-The map of each path type is that of `radarize.signal.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its
-part of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the
-window's transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the
-burst's loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise,
-converter and channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close
-faster than `RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
+The map of each path type equals `radarize.signal.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part
+of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
+transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; a few instants of the
+burst suffice, because the map sums over Doppler, which equals the mean over loops. Left out are noise, converter,
+channel mismatch (which calibration removes), and the smear over azimuth of echoes whose closing speed exceeds
+`RadarConfig.max_velocity`, whose delays between transmitters the map compensates at the wrong speed.
 """
 
 from typing import NamedTuple
@@ -22,48 +22,48 @@ from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.synthesis import _sincos_cycles
 from radarsim.scenario import Frames, Scenario
-from radarsim.sensors.causes import CAUSES, TYPES
+from radarsim.sensors.by_path_type import PARTS, TYPES
 from radarsim.sensors.scan import AZIMUTHS, axes
 from radarsim.sensors.sensor import Sensor
 
 _INSTANTS = 3
 #: Half width of the window's transform, bins, and its table's entries per bin.
 _WIDTH, _FINE = 4, 64
-#: Powers are kept in steps of so many dB, and not below so many dB under the noise: that is what lets them be packed.
+#: Step and lowest level of stored powers, dB and dB below the noise: rounded values compress better.
 STEP, DEPTH = 0.25, 10.0
-#: Label of cells in which the echoes do not reach the noise.
+#: Label of cells in which no echo reaches the noise.
 NOISE = 255
 
 
 class Ghosts(Sensor):
-    """Power by path type on the radar's range bins and the scan's bearings, and the strongest type of every cell."""
+    """Power by path type on the radar's range bins and the scan's bearings, and the strongest type of each cell."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
         config, front_end = scenario.config, scenario.board
-        self._maps = CauseMaps(config)
+        self._maps = PathTypeMaps(config)
         window = np.hanning(config.samples)
         window /= window.sum()
         taper = self._maps.taper
         self._floor = 10 * np.log10(front_end.counts**2 * front_end.noise_power * np.sum(window**2) * np.sum(taper**2))
-        leakage = np.fft.fft(front_end.by_cause([])[0][0] * window, axis=-1).reshape(-1, config.samples)
+        leakage = np.fft.fft(front_end.by_path_type([])[0][0] * window, axis=-1).reshape(-1, config.samples)
         self._leakage = self._maps.beams(leakage[self._maps.row].T[None])
         shape = (config.samples, len(AZIMUTHS))
-        labels = ", ".join(f"{i} {name}" for i, name in enumerate(CAUSES))
+        labels = ", ".join(f"{i} {name}" for i, name in enumerate(PARTS))
         self.streams = {
             "truth/cause_power": Stream(
                 (len(PathType), *shape), "f2", "dB of ADC counts^2",
-                f"range-azimuth power by cause ({', '.join(TYPES)}), not below {DEPTH:g} dB under the noise",
+                f"range-azimuth power by path type ({', '.join(TYPES)}), not below {DEPTH:g} dB under the noise",
             ),
             "truth/cause": Stream(
-                shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise",
-                labels=CAUSES,
+                shape, "u1", "", f"strongest path type of a range-azimuth cell: {labels}, {NOISE} noise",
+                labels=PARTS,
             ),
         }  # fmt: skip
         self.products = axes("truth/cause", config, "range bins")
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Maps and labels."""
+        """Power maps and labels of frames."""
         power, cause = [], []
         for lengths, amplitudes, types in zip(frames.lengths, frames.received, frames.types, strict=True):
             maps = self._maps(lengths, self.scenario.board.scale * amplitudes, types)
@@ -72,8 +72,8 @@ class Ghosts(Sensor):
         level = 10 * np.log10(np.maximum(np.stack(power), 10 ** ((self._floor - DEPTH) / 10)))
         return {"truth/cause_power": STEP * np.rint(level / STEP), "truth/cause": np.stack(cause)}
 
-    def label(self, power: Float[np.ndarray, "cause range azimuth"]) -> UInt8[np.ndarray, "range azimuth"]:
-        """Index into `CAUSES` of the strongest one, leakage among them, or `NOISE`."""
+    def label(self, power: Float[np.ndarray, "type range azimuth"]) -> UInt8[np.ndarray, "range azimuth"]:
+        """Index into `PARTS` of the strongest part, leakage included, or `NOISE`."""
         every = np.concatenate([power, self._leakage[None]])
         return np.where(every.sum(axis=0) > 10 ** (self._floor / 10), every.argmax(axis=0), NOISE).astype(np.uint8)
 
@@ -84,10 +84,10 @@ class _Tones(NamedTuple):
     Attributes:
         row: antennas.
         instants: of the burst, -1...1.
-        kernel: of a tone between two bins.
+        kernel: window transform of a tone between two bins.
         per_metre, per_rate: bins by path length and by its change over half a burst.
-        wavenumber: cycles by metre.
-        video: cycles by square metre of the residual video phase.
+        wavenumber: cycles per metre.
+        video: cycles per square metre of the residual video phase.
     """
 
     row: Int[np.ndarray, "antenna"]
@@ -99,7 +99,7 @@ class _Tones(NamedTuple):
     video: float
 
 
-class CauseMaps:
+class PathTypeMaps:
     """Range-azimuth power of each path type, computed from the echoes.
 
     Args:
@@ -122,7 +122,7 @@ class CauseMaps:
         offset = np.arange(-_WIDTH * _FINE, _WIDTH * _FINE + 1) / _FINE
         turns = np.cos(2 * np.pi * offset[:, None] * (np.arange(n) - (n - 1) / 2) / n)
         kernel = (turns @ window / window.sum()).astype(np.float32)
-        # Loops count by the square of their weight: instants that split it evenly stand for all of them.
+        # Loops are weighted by the square of the window: a few instants at equal parts of this weight represent them.
         share = np.cumsum(np.hamming(max(config.loops, 2)) ** 2)
         even = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
         instants = np.interp(even, share / share[-1], np.linspace(-1, 1, len(share)))
@@ -136,7 +136,7 @@ class CauseMaps:
         lengths: Float[np.ndarray, "echo virtual 3"],
         amplitudes: Complex[np.ndarray, "echo"],
         types: UInt8[np.ndarray, "echo"],
-    ) -> Float[np.ndarray, "cause range azimuth"]:
+    ) -> Float[np.ndarray, "type range azimuth"]:
         """Power of each path type in the square of the amplitudes' unit."""
         n = self.config.samples
         spectra = np.zeros((_INSTANTS, len(PathType), n, 2, len(self.row)), np.float32)

@@ -1,7 +1,7 @@
-"""An inertial sensor like the D435i's Bosch BMI055, at 200 Hz.
+"""Inertial measurement unit like the D435i's Bosch BMI055, at 200 Hz.
 
-It measures specific force (what a scale would feel: at rest +g upward) and angular velocity, exact derivatives of the
-motion's splines at the sensor's own place, plus
+It measures specific force (at rest +g upward) and angular velocity, exact derivatives of the motion's splines at the
+sensor's position, plus
 
 - white noise of density N: Allan deviation N / sqrt(tau);
 - a bias that is constant, plus a first-order Gauss-Markov process whose Allan deviation peaks at the bias instability
@@ -30,7 +30,7 @@ _PEAK, _FLOOR = 0.618, 0.664
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a triad of accelerometers or gyroscopes, in its unit u: m/s^2 or rad/s.
+    """Error model of a triad of accelerometers or gyroscopes, in its unit u: m/s^2 or rad/s.
 
     Attributes:
         noise: density of the white noise, u / sqrt(Hz).
@@ -58,7 +58,7 @@ class Errors:
 
     @property
     def _wander(self) -> float:
-        """Standard deviation of the Gauss-Markov part."""
+        """Standard deviation of the Gauss-Markov part of the bias."""
         return self.instability * _FLOOR / _PEAK
 
 
@@ -76,21 +76,21 @@ GYROSCOPE = Errors(
 
 
 class Triad:
-    """Three sensors at right angles, with errors drawn for all samples at once.
+    """Triad of orthogonal sensors, with errors drawn for all samples at once.
 
     Args:
         errors: of each.
-        rng: draws them; a shorter series has the same errors as the start of a longer one.
-        count: of samples, at `RATE`.
+        rng: random generator; a shorter series has the same errors as the start of a longer one.
+        count: number of samples, at `RATE`.
 
     Attributes:
-        bias: constant, wandering and walking, of every sample.
+        bias: constant, Gauss-Markov and random-walk parts together, of every sample.
     """
 
     bias: Float[np.ndarray, "tick 3"]
 
     def __init__(self, errors: Errors, rng: np.random.Generator, count: int):
-        from scipy.signal import lfilter  # which takes long to load
+        from scipy.signal import lfilter  # slow to import
 
         self._errors = errors
         start, drive = rng.standard_normal((2, 3)), rng.standard_normal((count, 3, 3))
@@ -104,14 +104,14 @@ class Triad:
     def measure(
         self, truth: Float[np.ndarray, "tick 3"], ticks: Int[np.ndarray, "tick"]
     ) -> Float[np.ndarray, "tick 3"]:
-        """Measured values of the samples with numbers `ticks`."""
+        """Measured values of the samples with indices `ticks`."""
         errors = self._errors
         value = np.rint((truth + self.bias[ticks] + self._noise[ticks]) / errors.step) * errors.step
         return np.clip(value, -errors.limit, errors.limit)
 
 
 class Imu(Sensor):
-    """Accelerometers and gyroscopes in the depth camera's housing, axes parallel to the radar's."""
+    """Accelerometers and gyroscopes in the depth camera's housing, with axes parallel to the radar's."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -143,7 +143,7 @@ class Imu(Sensor):
         return turned(self._motion.rotation(times).inv(), acceleration), self._motion.angular_velocity(times)
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Samples until the next frame."""
+        """Samples up to the next frame."""
         ticks = frames.ticks(RATE)
         times = ticks / RATE
         force, turn = self.truth(times)

@@ -1,4 +1,4 @@
-"""A lidar beside the radar, as pictures of its points at its own height (`radarize.signal.polar`)."""
+"""Lidar beside the radar, as pictures of its points at its own height (`radarize.signal.polar`)."""
 
 import numpy as np
 from jaxtyping import Float
@@ -8,8 +8,7 @@ from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.scan import headings
 from radarsim.sensors.sensor import Sensor
 
-#: rad: of the beams over and under the horizon that can meet something within the slab, as of a lidar of 64 beams
-#: over 33 deg.
+#: rad: elevations of the beams that can meet a surface within the slab, as of a lidar of 64 beams over 33 deg.
 ELEVATIONS = np.radians(np.linspace(-16.5, 16.5, 33))
 
 
@@ -26,7 +25,7 @@ class Lidar(Sensor):
         self._reach = polar.SLAB / slope  # of each beam before it leaves the slab, m
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The pictures."""
+        """Lidar images of frames."""
         motion, times = self.scenario.motion, frames.middles
         each = zip(times, motion.position(times), headings(motion, times), strict=True)
         return {"truth/lidar": np.stack([self._picture(*one) for one in each])}

@@ -1,4 +1,4 @@
-"""Every propagation path above the noise: apparent place, power, path type and mechanism."""
+"""Every propagation path above the noise: apparent position, power, path type and mechanism."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
-#: Of each path, in this order.
+#: Columns of a path, in this order.
 COLUMNS = (
     "range", "azimuth", "elevation", "closing_speed", "power_db", "type", "bounces", "through", "blocked", "level"
 )  # fmt: skip
-#: Power over that of the weakest paths that are found (`FrontEnd.weakest`): those at the noise of a burst.
+#: Power relative to that of the weakest paths that are found (`FrontEnd.weakest`): the noise of a burst.
 _OVER_WEAKEST = 10.0
 
 

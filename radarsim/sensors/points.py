@@ -1,4 +1,4 @@
-"""Point cloud as the radar's own chip makes it of the samples."""
+"""Point cloud by the detection chain on the radar's own chip."""
 
 import numpy as np
 
@@ -8,10 +8,10 @@ from radarsim.sensors.sensor import Sensor
 
 
 class ChipPoints(Sensor):
-    """TI's point cloud of every frame, from the simulated samples."""
+    """TI's point cloud of every frame, computed from the simulated samples."""
 
     def __init__(self, scenario: Scenario):
-        from radarize.signal.points import COLUMNS, PointClouds  # loads PyTorch: two seconds that few recordings need
+        from radarize.signal.points import COLUMNS, PointClouds  # imports PyTorch, which takes two seconds
 
         super().__init__(scenario)
         self._clouds = PointClouds(scenario.config)

@@ -1,4 +1,4 @@
-"""Exact pose and velocity of the radar in the middle of every burst."""
+"""Exact pose and velocity of the radar at the centre of every burst."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ class TruePose(Sensor):
     }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Pose and velocity."""
+        """Pose and velocity of frames."""
         motion, times = self.scenario.motion, frames.middles
         rotation = motion.rotation(times)
         linear = turned(rotation.inv(), motion.velocity(times))

@@ -1,8 +1,8 @@
-"""Scan of a perfect lidar at the radar in the horizontal plane: ranges, and labels on the radar's range bins.
+"""Scan of a perfect lidar at the radar in the horizontal plane: ranges, and occupancy labels on the radar's range bins.
 
-Both are levelled: the plane is horizontal whatever the sensor's roll and pitch, and bearings count from the direction
-in which its boresight points on the plan. Rays start where the sensor is in the middle of the burst. Glass counts as a
-surface, as it does for the radar; moving objects are at their places of that instant.
+Both are levelled: the plane is horizontal whatever the sensor's roll and pitch, and bearings are relative to the
+horizontal direction of its boresight. Rays start at the sensor's position at the centre of the burst. Glass counts as a
+surface, as it does for the radar; moving objects are at their positions at that time.
 """
 
 from enum import IntEnum
@@ -18,7 +18,7 @@ from radarsim.sensors.sensor import Sensor
 
 #: Bearings of the scan, rad: the radar's own 88 columns of one degree.
 AZIMUTHS = np.deg2rad(np.arange(-44, 44))
-#: Bearings of the four rays that share a column of the label, rad, (column, ray).
+#: Bearings of the four rays per column of the label, rad, (column, ray).
 RAYS = AZIMUTHS[:, None] + (AZIMUTHS[1] - AZIMUTHS[0]) * ((np.arange(4) + 0.5) / 4 - 0.5)
 
 
@@ -31,7 +31,7 @@ class Cell(IntEnum):
 
 
 def headings(motion: Motion, times: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
-    """Directions in which the boresight points on the plan, rad."""
+    """Horizontal direction of the boresight, rad."""
     forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
     return np.arctan2(forward[:, 1], forward[:, 0])
 
@@ -39,13 +39,13 @@ def headings(motion: Motion, times: Float[np.ndarray, "frame"]) -> Float[np.ndar
 def level_rays(
     motion: Motion, times: Float[np.ndarray, "frame"], azimuths: Float[np.ndarray, "ray"]
 ) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame ray 3"]]:
-    """Origins and horizontal unit directions of rays at bearings against the boresight's on the plan."""
+    """Origins and horizontal unit directions of rays at bearings relative to the boresight's horizontal direction."""
     bearing = headings(motion, times)[:, None] + azimuths
     return motion.position(times), np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=-1)
 
 
 def axes(name: str, config: RadarConfig, cells: str) -> dict[str, Product]:
-    """Ranges and bearings of a stream on the radar's range bins and the scan's bearings."""
+    """Range and bearing axes of a stream on the radar's range bins and the scan's bearings."""
     return {
         f"{name}_ranges": Product(config.ranges - config.range_bias, "m", f"{cells} of /{name}"),
         f"{name}_azimuths": Product(AZIMUTHS, "rad", f"bearings of /{name}, positive to the left"),
@@ -53,7 +53,7 @@ def axes(name: str, config: RadarConfig, cells: str) -> dict[str, Product]:
 
 
 class PlanarScan(Sensor):
-    """Range of the first surface per bearing."""
+    """Range of the first surface on each bearing."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -70,14 +70,14 @@ class PlanarScan(Sensor):
         }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The scan."""
+        """Scans of frames."""
         times = frames.middles
         distance = self.scenario.rays.distance(*level_rays(self.scenario.motion, times, AZIMUTHS), times)
         return {"truth/scan": np.where(distance <= self.scenario.config.max_range, distance, np.inf)}
 
 
 class Occupancy(Sensor):
-    """State of every cell of a polar grid with the radar's own range bins and the scan's bearings."""
+    """State of every cell of a polar grid with the radar's range bins and the scan's bearings."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -91,14 +91,14 @@ class Occupancy(Sensor):
         self.products = axes("truth/occupancy", scenario.config, "middles of the range cells")
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """The label."""
+        """Occupancy labels of frames."""
         times = frames.middles
         rays = level_rays(self.scenario.motion, times, RAYS.ravel())
         distance = self.scenario.rays.distance(*rays, times).reshape(len(times), *RAYS.shape)
         return {"truth/occupancy": self.label(distance)}
 
     def label(self, distance: Float[np.ndarray, "frame column ray"]) -> UInt8[np.ndarray, "frame range column"]:
-        """States from the ranges of a column's rays: free up to the farthest of its first surfaces, unknown behind."""
+        """States from the ranges of a column's rays: free up to the farthest of its first surfaces, unknown beyond."""
         config = self.scenario.config
         index = (np.minimum(distance, 2 * config.max_range) + config.range_bias) / config.range_resolution
         index = np.rint(index).astype(int)

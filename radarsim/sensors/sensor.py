@@ -1,4 +1,4 @@
-"""Interface of a recording's sensors: streams, products, and rows for some frames."""
+"""Interface of a recording's sensors: streams, products, and the rows of some frames."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -10,13 +10,13 @@ from radarsim.scenario import Frames, Scenario
 
 
 class Sensor(ABC):
-    """A sensor beside the radar, or a truth that no sensor measures.
+    """Sensor beside the radar, or ground truth.
 
-    Rows of a frame depend on its instant alone: drifting errors are drawn for the whole motion, noise is keyed by the
-    instant (`Scenario.rng`).
+    Rows of a frame depend only on its time: drifting errors are drawn for the whole motion, noise is keyed by the time
+    (`Scenario.rng`).
 
     Args:
-        scenario: that it is part of.
+        scenario: scenario of the recording.
 
     Attributes:
         streams: growing data sets of the recording by path.
@@ -31,5 +31,5 @@ class Sensor(ABC):
 
     @abstractmethod
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Rows of each stream: one a frame, or as many as its own clock ticks until the next. Clocks in s are the
+        """Rows of each stream: one per frame, or all ticks of its own clock until the next frame. Clocks in s are the
         motion's; those that count frames start with 0 at the first of `frames`."""

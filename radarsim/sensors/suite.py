@@ -7,7 +7,7 @@ import numpy as np
 from radarize.io.errors import InputError
 from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
-from radarsim.sensors.causes import AdcByCause, CauseCounts
+from radarsim.sensors.by_path_type import AdcByPathType, PathTypeCounts
 from radarsim.sensors.depth import DepthCamera, DepthStrip
 from radarsim.sensors.ghosts import Ghosts
 from radarsim.sensors.imu import Imu
@@ -20,9 +20,9 @@ from radarsim.sensors.sensor import Sensor
 from radarsim.sensors.tracking import TrackingCamera
 from radarsim.world import plugins
 
-#: Sensors that cost next to nothing and are always there.
-ALWAYS: dict[str, type[Sensor]] = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
-#: Sensors to choose from; plug-ins enter theirs.
+#: Sensors that are always recorded; their cost is negligible.
+ALWAYS: dict[str, type[Sensor]] = {"pose": TruePose, "scan": PlanarScan, "causes": PathTypeCounts}
+#: Optional sensors; plug-ins add theirs.
 SENSORS: dict[str, type[Sensor]] = {
     "depth": DepthCamera,
     "depth-strip": DepthStrip,
@@ -32,19 +32,18 @@ SENSORS: dict[str, type[Sensor]] = {
     "points": ChipPoints,
     "ghosts": Ghosts,
     "lidar": Lidar,
-    "adc-by-cause": AdcByCause,
+    "adc-by-cause": AdcByPathType,
     "paths": TruePaths,
 }
-#: Not part of ``all``: either depth camera writes the same stream, the others are as large as the recording or larger.
+#: Not part of ``all``: the two depth cameras write the same stream, the others are at least as large as the recording.
 _APART = {"depth-strip", "adc-by-cause", "paths"}
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """Names of sensors without repetition, in the order of `SENSORS`; ``all`` stands for all but
-    `_APART`.
+    """Return names of sensors without repetition, in the order of `SENSORS`; ``all`` stands for all but `_APART`.
 
     Raises:
-        InputError: there is no such sensor, or two exclude each other.
+        InputError: unknown sensor, or two that exclude each other.
     """
     plugins.load()
     for name in names:
@@ -52,7 +51,7 @@ def chosen(names: Sequence[str]) -> list[str]:
             raise InputError(f"sensors: {name!r} is unknown, expected all or some of {', '.join(SENSORS)}")
     wanted = {*names, *(SENSORS.keys() - _APART if "all" in names else ())}
     if {"depth", "depth-strip"} <= wanted:
-        raise InputError("sensors: depth and depth-strip are both asked for, expected one depth camera")
+        raise InputError("sensors: depth and depth-strip are both chosen, expected one depth camera")
     return [name for name in SENSORS if name in wanted]
 
 
@@ -60,11 +59,11 @@ class Suite:
     """The sensors of a scenario.
 
     Args:
-        scenario: that they are part of.
-        names: of the sensors; default: those that are always there, and the scenario's own.
+        scenario: scenario of the recording.
+        names: names of the sensors; default: those that are always recorded, and the scenario's.
 
     Attributes:
-        streams, products: of all of them, by path.
+        streams, products: those of all sensors, by path.
     """
 
     def __init__(self, scenario: Scenario, names: Iterable[str] | None = None):
@@ -72,7 +71,7 @@ class Suite:
         self.sensors: dict[str, Sensor] = {name: (ALWAYS | SENSORS)[name](scenario) for name in names}
         self.streams = {path: s for sensor in self.sensors.values() for path, s in sensor.streams.items()}
         self.products = {path: p for sensor in self.sensors.values() for path, p in sensor.products.items()}
-        # Those that others name as their clock, and the truth's.
+        # Clocks of the streams, and the truth's.
         self._clocks = {"truth/time", *(s.clock for s in self.streams.values())} & set(self.streams)
 
     @one_blas_thread
@@ -80,9 +79,9 @@ class Suite:
         """Rows of all streams for some frames.
 
         Args:
-            frames: what is observed.
-            first: number of the first of them in the recording.
-            start: stamp of the motion's zero, s.
+            frames: frames to observe.
+            first: index of the first of them in the recording.
+            start: time stamp of the motion's zero, s.
         """
         rows = {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}
         for clock in self._clocks:

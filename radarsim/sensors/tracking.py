@@ -1,9 +1,9 @@
-"""A tracking camera like Intel's RealSense T265: poses at 200 Hz, smooth, and slowly drifting away.
+"""Tracking camera like Intel's RealSense T265: smooth poses at 200 Hz with slow drift.
 
-Its visual-inertial odometry keeps gravity, but heading and scale are open: steps are added up with a scale error of
-0.5 % (standard deviation, constant) and a heading error that walks by 0.03 degrees in a second; every pose jitters by
-a millimetre and 0.02 degrees. So it ends up within 1 % of the way travelled most of the time, which is what its data
-sheet gives for closed loops.
+Its visual-inertial odometry observes gravity, but drifts in heading and scale: steps are summed with a scale error of
+0.5 % (standard deviation, constant) and a heading error with a random walk of 0.03 degrees per sqrt(s); every pose has
+white noise of a millimetre and 0.02 degrees. The final error is mostly within 1 % of the distance travelled, as its
+data sheet specifies for closed loops.
 """
 
 from functools import cached_property
@@ -23,7 +23,7 @@ JITTER = (1e-3, np.deg2rad(0.02))  # m, rad
 
 
 class TrackingCamera(Sensor):
-    """Poses of the radar as tracked, its lever arm already taken out, and as they are."""
+    """Poses of the radar as tracked, with the camera's lever arm removed, and as they are."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -36,7 +36,7 @@ class TrackingCamera(Sensor):
 
     @cached_property
     def _poses(self) -> tuple[Float[np.ndarray, "tick 7"], Float[np.ndarray, "tick 7"]]:
-        """Tracked and true poses of the whole motion, whose steps add up from its start."""
+        """Tracked and true poses of the whole motion, whose steps are summed from its start."""
         motion, rng = self.scenario.motion, self.scenario.rng("tracking")
         times = self.scenario.ticks(RATE) / RATE
         position, rotation = motion.position(times), motion.rotation(times)
@@ -49,6 +49,6 @@ class TrackingCamera(Sensor):
         return np.hstack([tracked, shaken.as_quat()]), np.hstack([position, rotation.as_quat()])
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Poses until the next frame."""
+        """Poses up to the next frame."""
         ticks, (tracked, true) = frames.ticks(RATE), self._poses
         return {"tracking/time": ticks / RATE, "tracking/pose": tracked[ticks], "tracking/true_pose": true[ticks]}

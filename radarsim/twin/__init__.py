@@ -1,1 +1,1 @@
-"""The twin of a recording: the same walk simulated in a model of its place, and how alike the two are."""
+"""Digital twin of a recording: the same walk simulated in a model of its place, and a comparison of the two."""

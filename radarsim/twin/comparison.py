@@ -1,9 +1,9 @@
-"""Comparison of a recording with its twin, frame by frame: the same radar on the same walk, in the real place and in a
-model of it (`radarsim twin`).
+"""Comparison of a recording with its twin, frame by frame: the same radar on the same walk, in the real place and in
+its model (`radarsim twin`).
 
-Maps are those that networks see (`radarize.signal.maps`), in dB over their own median, so that the receiver's gain,
-which is a figure of its own, and the noise of empty cells drop out. Velocities and scans are made without networks, of
-single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
+Maps are those that networks get (`radarize.signal.maps`), in dB relative to their median, so that the receiver's gain,
+which is compared separately, and the noise of empty cells have no influence. Velocities and scans are estimated without
+networks from single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,7 +25,7 @@ from radarize.signal.batch import Batch, Signal
 from radarize.signal.maps import MAPS
 from radarsim.twin.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
 
-#: What is compared of every frame, with unit and meaning. Those of maps end in the map's name.
+#: Quantities compared for every frame, with unit and description. Those of maps end in the map's name.
 FIGURES = {
     "profile_correlation": ("", "correlation of the range profiles in dB"),
     "profile_rms": ("dB", "RMS difference of the range profiles, gain taken out"),
@@ -39,39 +39,39 @@ FIGURES = {
     "bearings_within_10cm": ("", "share of bearings returned by both whose ranges agree within 10 cm"),
     "bearings_returned": ("", "share of the recording's returned bearings that the twin returns too"),
 }
-#: Shifts of the twin that are tried, each way: s, rad, m.
+#: Shifts of the twin that are tried in both directions: s, rad, m.
 SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
-#: Frames that shifts are tried on, spread over the recording.
+#: Number of frames for which shifts are tried, spread over the recording.
 _TRIED = 200
-#: A shift is reported from this gain in correlation, this correlation and this number of frames on.
+#: Smallest gain in correlation, correlation and number of frames at which a shift is reported.
 BETTER, WELL, FEWEST = 0.05, 0.3, 5
-#: s by which stamps of the same frame may differ.
+#: Largest difference between time stamps of the same frame, s.
 _SAME = 1e-4
-#: Fewest loops of which noise and velocity are estimated.
+#: Smallest number of loops for an estimate of noise and velocity.
 _LOOPS = 8
 _BATCH = 16
 
 
 @dataclass
 class Comparison:
-    """Figures and what they were made of, frame by frame.
+    """Figures of the comparison and the data behind them, frame by frame.
 
     Attributes:
         config: radar configuration.
-        frames: numbers in the recording and in the twin.
-        times: stamps since the recording's first frame, s.
+        frames: frame indices in the recording and in the twin.
+        times: times since the recording's first frame, s.
         ranges, azimuths: of the range-azimuth maps' cells, m and rad.
         profiles: of recording and twin, counts^2.
         noise: noise floors of recording and twin, counts^2.
         figures: one value a frame, NaN where there is none, see `FIGURES`.
-        chance: the same figures' medians between frames that have nothing to do with each other: the recording's, and
-            the twin's of half a recording later.
+        chance: medians of the same figures between unrelated frames: the recording's, and the twin's of half a
+            recording later.
         velocity: of recording, twin, and poses (NaN if unknown), m/s, forward and left; none of a single antenna.
-        scans: of recording and twin on `BEARINGS`, m, inf where nothing is seen; none of a single antenna.
-        alignment: mean correlation of range-azimuth maps over shifts of the twin: by what is shifted, the shifts (s,
-            rad, m) and the correlations.
-        frechet: by map, Fréchet's distance of patch statistics: twin from recording, and, for scale, the recording's
-            second half from its first, dB.
+        scans: of recording and twin on `BEARINGS`, m, inf without a return; empty for a single antenna.
+        alignment: mean correlation of range-azimuth maps over shifts of the twin: for each kind of shift, the shifts
+            (s, rad, m) and the correlations.
+        frechet: by map, Fréchet distance of patch statistics: between recording and twin, and, for scale, between the
+            recording's two halves, dB.
     """
 
     config: RadarConfig
@@ -89,10 +89,10 @@ class Comparison:
     frechet: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def misfits(self) -> dict[str, tuple[float, float]]:
-        """Shifts with which the maps agree better than without: the shift (s, rad, m) and the gain in correlation.
+        """Shifts that improve the agreement of the maps: the shift (s, rad, m) and the gain in correlation.
 
-        Time, heading or distances of the poses are then off, or those of the scene. A best shift at the end of those
-        tried says nothing, nor does one of a few frames.
+        They indicate errors in time, heading or distances of the poses, or in the scene. A best shift at the end of the
+        range that was tried, or one of few frames, is not conclusive.
         """
         found: dict[str, tuple[float, float]] = {}
         if len(self.frames) < FEWEST:
@@ -105,12 +105,12 @@ class Comparison:
 
     @property
     def noise_counts(self) -> Float[np.ndarray, "2"]:
-        """Noise of recording and twin, counts; NaN where it is unknown."""
+        """Noise of recording and twin, counts; NaN if unknown."""
         known = self.noise[np.isfinite(self.noise).all(axis=1)]
         return np.sqrt(np.median(known, axis=0)) if len(known) else np.full(2, np.nan)
 
     def summary(self) -> dict[str, Any]:
-        """All figures as plain data; not-a-number is None."""
+        """All figures as plain data; NaN becomes None."""
         spread = pd.DataFrame(self.figures).dropna(axis=1, how="all").quantile([0.5, 0.1, 0.9])
         spread = spread.set_axis(["median", "p10", "p90"])
         spread.loc["unrelated_frames"] = pd.Series(self.chance)
@@ -136,11 +136,11 @@ def _plain(value: Any) -> Any:
 
 
 def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None = None) -> Comparison:
-    """Compare a recording with its twin. Takes some 100 kB of memory a frame.
+    """Compare a recording with its twin. Needs some 100 kB of memory per frame.
 
     Args:
-        real, twin: recordings of the same radar configuration; frames of the same stamp belong together.
-        progress: called with (frames done, frames in all).
+        real, twin: recordings of the same radar configuration; frames of equal time stamp are compared.
+        progress: called with (frames done, total frames).
 
     Raises:
         InputError: unusable recordings, other configurations, or no frame in common.
@@ -186,7 +186,7 @@ def _require_same(one: Recording, other: Recording) -> None:
 
 
 def _pairs(one: Recording, other: Recording) -> Int[np.ndarray, "frame 2"]:
-    """Numbers of frames that have the same stamp, but for those that either has lost as a whole."""
+    """Indices of frames with equal time stamps, without those that are completely lost in either recording."""
     if not len(one) or not len(other):
         raise InputError(f"{(other if len(one) else one).path}: has no whole frame, expected at least one")
     nearest = np.clip(np.searchsorted(other.times, one.times - _SAME), 0, len(other) - 1)
@@ -207,7 +207,7 @@ class _Analysis:
         self.maker = self._signal.maker
         self.ranges, self.azimuths = self.maker.heatmaps.ranges, self.maker.heatmaps.azimuths
         self.maps = self.maker.names if len(self.maker.heatmaps.row) > 1 else ()
-        self._far = self.ranges >= ScanConfig().min_range  # nearer is leakage, the same anywhere
+        self._far = self.ranges >= ScanConfig().min_range  # nearer cells contain leakage, the same everywhere
         self._velocity = DopplerVelocity(self.maker.heatmaps)
 
     def __call__(self, source: Recording, frames: Int[np.ndarray, "frame"]) -> dict[str, np.ndarray]:
@@ -228,7 +228,7 @@ class _Analysis:
         return found
 
     def _noise(self, adc: np.ndarray, valid: np.ndarray) -> Float[np.ndarray, "frame"]:
-        """Noise floors, counts^2; NaN of frames with lost chirps, or of too few to tell."""
+        """Noise floors, counts^2; NaN for frames with lost chirps, or with too few loops for an estimate."""
         signal = adc.astype(np.float32).view(np.complex64)[..., 0]
         whole = np.all(valid, axis=(1, 2)) & (self.config.loops >= _LOOPS)
         return np.array(
@@ -243,11 +243,11 @@ class _Analysis:
 
 
 def _figures(real: dict[str, np.ndarray], twin: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Figures of pairs of frames by name."""
+    """Figures by name, one value per pair of frames."""
     far = real["far"][0]
     level = [10 * np.log10(np.maximum(part["profile"][:, far], 1e-9)) for part in (real, twin)]
     apart = level[1] - level[0]
-    # Echoes: 10 dB above what most bins hold.
+    # Echoes: cells 10 dB above the level of most bins.
     heard = level[0] > np.quantile(level[0], 0.25, axis=1, keepdims=True) + 10
     gain = np.array([np.median(row[h]) if h.any() else np.median(row) for row, h in zip(apart, heard, strict=True)])
     found = {
@@ -287,7 +287,7 @@ def _alignment(real: np.ndarray, twin: np.ndarray, result: Comparison) -> dict[s
             continue
         shifts, values = np.arange(-most, most + 1), []
         for shift in shifts:
-            kept = cells[(cells >= shift) & (cells - shift < length)]  # what both have once the twin is shifted
+            kept = cells[(cells >= shift) & (cells - shift < length)]  # overlap after the shift
             values.append(_mean(correlation(maps[0].take(kept, axis), maps[1].take(kept - shift, axis))))
         found[name] = (shifts * step, np.array(values))
     return found

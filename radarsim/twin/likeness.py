@@ -1,9 +1,9 @@
-"""How alike heat maps are: cell by cell, of the same place, by correlation and MS-SSIM; or as sets, whatever places
-they show, by statistics of their patches and Fréchet's distance.
+"""Similarity of heat maps: cell by cell for the same place, by correlation and MS-SSIM; or as sets from any places, by
+statistics of their patches and the Fréchet distance.
 
-Of sets: as in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019), patches
-are the samples, so that a single frame has a distribution too; their features are not a network's but what a reader of
-heat maps looks at: levels and contrasts, in dB.
+Sets are compared as in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019):
+patches are the samples, so that a single frame has a distribution, too. Features are levels and contrasts in dB instead
+of a network's.
 """
 
 import numpy as np
@@ -11,11 +11,11 @@ import scipy.linalg
 import torch
 from jaxtyping import Float
 
-#: Cells of a patch, rows and columns: 36 cm or 0.9 m/s by 12 deg at the radarize preset.
+#: Size of a patch, rows and columns: 36 cm or 0.9 m/s by 12 deg at the radarize preset.
 PATCH = (8, 8)
 #: Quantiles of a patch's levels.
 QUANTILES = (0.1, 0.5, 0.9)
-#: Levels are clipped at this many dB over a map's median.
+#: Levels are clipped at this value, dB above a map's median.
 DEPTH = 45.0
 #: Weights of MS-SSIM's scales from fine to coarse, and side of its Gaussian window of 1.5 cells (Wang, Simoncelli and
 #: Bovik, "Multiscale structural similarity for image quality assessment", Asilomar 2003). At the coarsest scale
@@ -24,14 +24,15 @@ SCALES, WINDOW = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333), 11
 
 
 def foreground(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame row column"]:
-    """dB over each map's median, 0...`DEPTH`: most cells of a room are empty, and their noise is not compared."""
+    """Level above each map's median, 0...`DEPTH` dB: most cells of a room are empty, and their noise is not
+    compared."""
     return np.clip(maps - np.median(maps, axis=(1, 2), keepdims=True), 0, DEPTH)
 
 
 def correlation(
     one: Float[np.ndarray, "frame *cell"], other: Float[np.ndarray, "frame *cell"]
 ) -> Float[np.ndarray, "frame"]:
-    """Pearson's correlation over the cells of each pair; NaN where either has the same everywhere."""
+    """Pearson's correlation over the cells of each pair; NaN if either map is constant."""
     a, b = (np.asarray(maps, float).reshape(len(maps), -1) for maps in (one, other))
     a, b = (values - values.mean(axis=1, keepdims=True) for values in (a, b))
     scale = np.sqrt(np.sum(a**2, axis=1) * np.sum(b**2, axis=1))
@@ -41,8 +42,8 @@ def correlation(
 def similarity(
     one: Float[np.ndarray, "frame row column"], other: Float[np.ndarray, "frame row column"]
 ) -> Float[np.ndarray, "frame"]:
-    """MS-SSIM of each pair of maps of 0...`DEPTH` dB, at as many of its five scales as their smaller side has room for;
-    NaN where it has none."""
+    """MS-SSIM of each pair of maps of 0...`DEPTH` dB, at as many of its five scales as the smaller side allows; NaN if
+    it allows none."""
     from torchmetrics.functional.image import multiscale_structural_similarity_index_measure as ms_ssim
 
     side = min(one.shape[1:])
@@ -63,8 +64,8 @@ def similarity(
 
 
 def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame patch 5"]:
-    """What patches that overlap by half look like: quantiles of their levels about the map's mean, as the networks see
-    them (`radarize.learning.nets.maps.level`), and mean absolute steps from row to row and from column to column, dB.
+    """Statistics of patches that overlap by half: quantiles of their levels relative to the map's mean, as networks get
+    them (`radarize.learning.nets.maps.level`), and mean absolute steps between rows and between columns, dB.
 
     Args:
         maps: dB, at least `PATCH` large.
@@ -80,7 +81,7 @@ def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.nd
 
 
 def frechet_distance(one: Float[np.ndarray, "sample feature"], other: Float[np.ndarray, "another feature"]) -> float:
-    """Fréchet's distance of the normal distributions with two sets' means and covariances, in the features' unit:
+    """Fréchet distance of the normal distributions with two sets' means and covariances, in the features' unit:
     d^2 = |m1 - m2|^2 + tr(S1 + S2 - 2 (S1^1/2 S2 S1^1/2)^1/2) (Dowson and Landau, J. Multivariate Anal. 12, 1982).
     """
     apart = one.mean(axis=0) - other.mean(axis=0)

@@ -1,4 +1,4 @@
-"""A recording and its twin side by side on one page, with all figures as JSON beside it."""
+"""Report on a recording and its twin: one page with both side by side, and all figures as JSON beside it."""
 
 import json
 from collections.abc import Callable
@@ -18,29 +18,29 @@ from radarize.signal.bearings import BEARINGS
 from radarize.signal.heatmaps import Heatmaps
 from radarsim.twin.comparison import FIGURES, Comparison, compare
 
-#: Range profiles over time: a picture has no room for more.
+#: Largest number of range profiles over time in the picture.
 _PROFILES = 400
 _WHO = (("recording", COLORS["slam"]), ("twin", COLORS["odometry"]), ("poses", COLORS["truth"]))
-#: Unit, factor to it, and probable reason of a shift.
+#: Unit, factor to it, and probable cause of a shift.
 _SHIFTED = {
     "time": ("s", 1.0, "the clocks of poses and radar differ"),
     "azimuth": ("deg", 180 / np.pi, "the poses' heading, the mounting or the scene is turned"),
-    "range": ("m", 1.0, "the radar's range bias, a lever arm or the scene's size is off"),
+    "range": ("m", 1.0, "the radar's range bias, a lever arm or the scene's size is wrong"),
 }
 
 
 def report_twin(
     real: Path, twin: Path, output: Path | None = None, progress: Callable[[int, int], None] | None = None
 ) -> tuple[Path, list[str]]:
-    """Compare a recording with its twin and draw both.
+    """Compare a recording with its twin and write a report.
 
     Args:
         real, twin: recordings, see `compare`.
         output: page to write (``.html``), by default beside the twin; the figures go beside it (``.json``).
-        progress: called with (frames done, frames in all).
+        progress: called with (frames done, total frames).
 
     Returns:
-        The page's path, and the main figures, a sentence each.
+        Path of the page, and the main figures, one sentence each.
 
     Raises:
         InputError: see `compare`, or a file cannot be written.
@@ -91,7 +91,7 @@ def _headline(figures: dict) -> list[tuple[str, str]]:
 
 
 def _doubts(found: Comparison, warnings: str) -> list[str]:
-    """Sentences on what may make the comparison meaningless."""
+    """Warnings about conditions that make the comparison meaningless."""
     doubts = [warnings[0].upper() + warnings[1:] + "."] if warnings else []
     for name, (shift, gain) in found.misfits().items():
         unit, factor, reason = _SHIFTED[name]
@@ -107,8 +107,8 @@ def _doubts(found: Comparison, warnings: str) -> list[str]:
 def _table(page: Page, summary: dict) -> None:
     page.section(
         "Figures",
-        "Medians over frames, with the middle 80 %; and, for scale, the median between frames that have nothing to do "
-        "with each other, half a recording apart.",
+        "Medians over frames, with the middle 80 %; for scale, the median between unrelated frames, half a recording "
+        "apart.",
     )
 
     def text(value: float | None) -> str:
@@ -125,8 +125,8 @@ def _table(page: Page, summary: dict) -> None:
         page.text(f"Noise floor: {noise['recording']:.2f} counts in the recording, {noise['twin']:.2f} in the twin.")
     if summary["frechet_db"]:
         page.text(
-            "Fréchet's distance of the maps' patches, whatever place they show: as sets, do the two look alike? For "
-            "scale, that of the recording's second half from its first."
+            "Fréchet distance of the maps' patches: similarity as sets, independent of the place shown. For scale, the "
+            "distance between the recording's two halves.",
         )
         distances = summary["frechet_db"].items()
         halves = [(n.replace("_", " "), text(d["twin"]), text(d["own_halves"])) for n, d in distances]
@@ -138,8 +138,8 @@ def _alignment(page: Page, found: Comparison) -> None:
         return
     page.section(
         "Alignment",
-        "Mean correlation of range-azimuth maps over shifts of the twin. A peak beside zero means that stamps, poses "
-        "or scene are off, and other figures say little; no peak at all, that the place is another.",
+        "Mean correlation of range-azimuth maps over shifts of the twin. A peak away from zero indicates wrong time "
+        "stamps, poses or scene, which makes other figures unreliable; no peak at all indicates a different place.",
     )
     figure = make_subplots(rows=1, cols=len(found.alignment))
     for column, (name, (shifts, values)) in enumerate(found.alignment.items(), 1):
@@ -153,7 +153,7 @@ def _alignment(page: Page, found: Comparison) -> None:
 
 
 def _profiles(page: Page, found: Comparison) -> None:
-    page.section("Range profiles", "Power over range, all antennas and speeds together; dB below the strongest echo.")
+    page.section("Range profiles", "Power over range, summed over antennas and velocities; dB re strongest echo.")
     shown = np.unique(np.linspace(0, len(found.frames) - 1, _PROFILES).astype(int))
     if len(shown) > 1:
         figure, axes = canvas(2, height=3.0)
@@ -170,8 +170,8 @@ def _profiles(page: Page, found: Comparison) -> None:
 def _frames(page: Page, found: Comparison, one: Recording, other: Recording) -> None:
     page.section(
         "Heat maps and scans",
-        "The frames with the best, the median and the worst correlation. Rings: the scan made of the map; dots: the "
-        "surfaces that the scene has there, in both.",
+        "The frames with the best, the median and the worst correlation. Rings: the scan extracted from the map; dots: "
+        "the surfaces of the scene, in both.",
     )
     rank = np.argsort(np.nan_to_num(found.figures["correlation_range_azimuth"], nan=-1))
     maps = Heatmaps(found.config)
@@ -196,7 +196,7 @@ def _frames(page: Page, found: Comparison, one: Recording, other: Recording) -> 
 
 
 def _reach(found: Comparison) -> float:
-    """Range within which nearly all scans end, m; all of it if there are none."""
+    """Range within which nearly all scans end, m; the full range if there are none."""
     ends = found.scans[np.isfinite(found.scans)]
     return float(min(1.3 * np.quantile(ends, 0.98) + 0.5, found.ranges[-1])) if len(ends) else float(found.ranges[-1])
 

@@ -1,7 +1,7 @@
-"""The twin of a recording: the same walk, simulated in a model of the same place.
+"""Digital twin of a recording: the same walk, simulated in a model of the same place.
 
-Each frame of the twin has the recording's stamp, lost chirps, radar configuration and pose. The world differs: surfaces
-of the scene in place of the real ones, other speckle and other noise. `radarsim.twin.comparison` compares the two.
+Each frame of the twin has the recording's time stamp, lost chirps, radar configuration and pose. The world differs:
+surfaces of the scene replace the real ones, and speckle and noise are different.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,28 +26,28 @@ from radarsim.scenario import Scenario
 from radarsim.sensors.suite import chosen
 from radarsim.world.scene import Scene
 
-#: Longest time between two poses, s; frames in a longer gap have no twin.
+#: Longest time between two poses, s; frames in longer gaps are not simulated.
 GAP = 0.5
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a twin is made.
+    """Options of a twin.
 
     Attributes:
-        origin: where the poses' origin is in the scene; default: they are the scene's own coordinates.
-        mounting: of the radar on the body that the poses are of; default: they are the radar's own.
-        at: the place of a radar at rest, instead of poses.
+        origin: pose of the poses' origin in the scene; default: they are in the scene's coordinates.
+        mounting: mounting of the radar on the body that the poses describe; default: they are the radar's own.
+        at: pose of a radar at rest, instead of poses.
         frontend: front-end file (see `FrontEndConfig`); default: the board's, with channels that the recording's
             channel calibration makes equal.
-        fit: fit the front end to the recording instead (`calibrate`), and keep it beside the output as ``.yaml``.
+        fit: fit the front end to the recording instead (`calibrate`), and write it beside the output as ``.yaml``.
         every: simulate every N-th frame.
         duration: s of the recording, from its first frame; default: all of it.
-        seed: of speckle, noise and whatever differs from board to board.
+        seed: seed of speckle, noise and variation from board to board.
         sensors: see `simulate`.
 
     Raises:
-        InputError: options that do not go together, or an unusable one.
+        InputError: options that exclude each other, or an unusable one.
     """
 
     origin: Mounting | None = None
@@ -79,14 +79,14 @@ def make_twin(
     """Simulate the twin of a recording.
 
     Args:
-        recording: of a real radar, or of a simulated one that plays it, with poses.
-        scene: model of the place: a scene, its YAML file, or the name of one that comes with the project.
+        recording: of a real radar, or of a simulated one in its place, with poses.
+        scene: model of the place: a scene, its YAML file, or the name of a scene of the project.
         output: recording to write.
-        options: how.
-        progress: called with (frames done, frames in all).
+        options: options of the twin.
+        progress: called with (frames done, total frames).
 
     Returns:
-        The path written. Its attribute ``warnings`` says what is doubtful.
+        The path written. Its attribute ``warnings`` lists doubts about the data.
 
     Raises:
         InputError: unusable recording or scene; no poses, or poses outside the scene.
@@ -123,7 +123,7 @@ def make_twin(
 def _motion(
     recording: Recording, middles: Float[np.ndarray, "frame"], options: Options
 ) -> tuple[Motion, Bool[np.ndarray, "frame"]]:
-    """The radar's motion in the scene, and which frames, of bursts with these middles (s), have poses on both sides."""
+    """Motion of the radar in the scene, and which frames, with bursts centred at these times (s), lie between poses."""
     config, start = recording.config, float(recording.times[0])
     if options.at is not None:
         span = float(recording.times[-1] - start) + config.frame_period
@@ -145,7 +145,7 @@ def _motion(
 
 
 def _poses(recording: Recording, margin: float) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
-    """Stamps and poses that a recording came with, continued at both ends for the part of a burst that sticks out."""
+    """Time stamps and poses of a recording, extrapolated at both ends for the part of a burst that lies outside."""
     if not (recording.has("truth/pose") and recording.has("truth/time")):
         raise InputError(
             f"{recording.path}: has no poses (/truth/pose and /truth/time), expected where the radar was: import it "
@@ -154,7 +154,7 @@ def _poses(recording: Recording, margin: float) -> tuple[Float[np.ndarray, "pose
     stamps, poses = recording.read("truth/time"), recording.read("truth/pose")
     whole = min(len(stamps), len(poses))
     stamps, poses = stamps[:whole], poses[:whole]
-    known = np.isfinite(poses).all(axis=1) & np.isfinite(stamps)  # a tracking camera may have been blind for a while
+    known = np.isfinite(poses).all(axis=1) & np.isfinite(stamps)  # a tracking camera may lose track for a while
     stamps, poses = stamps[known], poses[known]
     if len(stamps) < 2:
         raise InputError(f"{recording.path}: has {len(stamps)} finite poses in /truth/pose, expected at least 4")
@@ -167,7 +167,8 @@ def _poses(recording: Recording, margin: float) -> tuple[Float[np.ndarray, "pose
 def _continued(
     stamps: Float[np.ndarray, "2"], poses: Float[np.ndarray, "2 7"], margin: float
 ) -> tuple[float, Float[np.ndarray, "7"]]:
-    """Stamp and pose a margin (s) beyond the second of two poses, at constant speed and turn rate."""
+    """Extrapolate time stamp and pose by a margin (s) beyond the second of two poses, at constant velocity and turn
+    rate."""
     share = margin / abs(stamps[1] - stamps[0])
     there, here = Rotation.from_quat(poses[:, 3:])
     turn = Rotation.from_rotvec(share * (here * there.inv()).as_rotvec())
@@ -176,7 +177,7 @@ def _continued(
 
 
 def _require_inside(places: Float[np.ndarray, "frame 3"], world: Scene, path: Path) -> None:
-    """Some of the poses must lie in the scene."""
+    """Raise InputError unless some of the poses lie in the scene."""
     low, high = world.bounds
     if not ((places >= low) & (places <= high)).all(axis=1).any():
         x, y, z = places.mean(axis=0)
@@ -188,9 +189,9 @@ def _require_inside(places: Float[np.ndarray, "frame 3"], world: Scene, path: Pa
 
 
 def _calibrated(config: RadarConfig) -> FrontEndConfig:
-    """The default board; where the recording has a channel calibration, a board of which that is the right one."""
+    """Front end of the default board; with a channel calibration in the recording, of a board that it is exact for."""
     if config.channel_calibration is None:
         return FrontEndConfig.of(config.board)
-    # The simulated board turns the antennas' signs by itself.
+    # The simulated board applies the antennas' signs itself.
     channels = load_board(config.board).signs / config.channel_factors
     return FrontEndConfig.of(config.board, mismatch=Mismatch(channels=tuple(map(Channel.of, channels.ravel()))))

@@ -1,1 +1,1 @@
-"""The scene: materials, objects, movers, ray tests, generators of buildings, importers."""
+"""Scenes: materials, objects, movers, ray tests, building generators, importers."""

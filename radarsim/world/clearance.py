@@ -1,4 +1,4 @@
-"""Where there is floor to move on, how far the nearest thing is, and what it is."""
+"""Clearance maps: free floor, distance to the nearest obstacle, and its name."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ from radarsim.world.scene import Scene
 from radarsim.world.shapes import closest
 
 RESOLUTION = 0.025  # m
-#: What rises less above the ground than this, m, is walked and rolled over: carpets, thresholds, unevenness.
+#: Height above the ground, m, below which objects are no obstacles: carpets, thresholds, unevenness.
 LOWEST = 0.03
-_DEEPEST = 0.5  # m from the lowest surface (a slab's underside, a pit) up to the floor, at most
+_DEEPEST = 0.5  # m, largest height of the floor above the lowest surface (a slab's underside, a pit)
 _LYING = 0.9  # cosine of the steepest floor's slope
 
 
@@ -33,9 +33,9 @@ class Clearance:
 
     @classmethod
     def of(cls, scene: Scene, low: float, high: float) -> "Clearance":
-        """Clearance for something that fills the heights `low` to `high` (m) above the ground: all surfaces there.
+        """Compute the clearance of a body that occupies the heights `low` to `high` (m) above the ground.
 
-        Floor is what faces up below `low`; a scene without any is all floor.
+        Floor is any surface that faces up below `low`; a scene without one is all floor.
         """
         level = ground_level(scene)
         low, high = level + low, level + high
@@ -53,7 +53,7 @@ class Clearance:
         free = floor if floor.any() else np.ones(shape, bool)
         free &= ~raster(between(scene.triangles, low, high))
         free[[0, -1]] = free[:, [0, -1]] = False
-        # Drawing rounds to cells: what is drawn may lie up to one cell further out.
+        # Rasterising rounds to cells: an obstacle may appear up to one cell larger.
         distance = ndimage.distance_transform_edt(free) * RESOLUTION - RESOLUTION
         return cls(origin, np.maximum(distance, 0.0))
 
@@ -63,7 +63,8 @@ class Clearance:
         return ndimage.map_coordinates(self.distance, cells.T, order=1, mode="constant")
 
     def uphill(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
-        """Gradient of the clearance: the direction away from the nearest thing, of length 1 or less between things."""
+        """Gradient of the clearance: the direction away from the nearest obstacle, of length 1 or less between
+        obstacles."""
         step = 2 * RESOLUTION
         offsets = step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
         east, west, north, south = (self.at(points + offset) for offset in offsets)
@@ -74,7 +75,7 @@ def ground_level(scene: Scene) -> float:
     """Height of the lowest wide floor, m; 0 in a scene without any."""
     corners = scene.triangles
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    # A floor is among the lowest things, but for what lies astray in scans; what else faces up is tops of furniture.
+    # The floor is among the lowest surfaces, except for outliers in scans; other upward faces are tops of furniture.
     lowest = _quantile(corners[:, :, 2].min(axis=1), areas, 0.01)
     floor = _floor(scene, lowest + _DEEPEST)
     if not floor.any():
@@ -86,7 +87,7 @@ def lowest_level(heights: Float[np.ndarray, "n"], areas: Float[np.ndarray, "n"])
     """Height of the lowest wide floor among level surfaces, m."""
     bins = ((heights - heights.min()) / 0.05).astype(int)
     wide = np.bincount(bins, areas)
-    # A floor at the edge of a bin lies in two.
+    # A floor at the edge of a bin lies in two bins.
     near = np.abs(bins - np.flatnonzero(wide >= 0.2 * wide.max())[0]) <= 1
     return _quantile(heights[near], areas[near], 0.5)
 
@@ -98,9 +99,9 @@ def _quantile(values: Float[np.ndarray, "n"], weights: Float[np.ndarray, "n"], s
 
 
 def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-    """Distance from points to the nearest thing other than the ground, m, and its index into the scene's objects.
+    """Distance from points to the nearest object other than the ground, m, and its index in the scene's objects.
 
-    Triangles less than `LOWEST` above the ground do not count. Where there is nothing else: inf and -1.
+    Triangles less than `LOWEST` above the ground do not count. Without any other object: inf and -1.
     """
     high = scene.triangles[:, :, 2].max(axis=1) > ground_level(scene) + LOWEST
     if not high.any():
@@ -110,14 +111,14 @@ def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.nd
 
 
 def _floor(scene: Scene, below: float) -> Bool[np.ndarray, "t"]:
-    """Triangles below a height that face up; of sheets, which have no inside, either way."""
+    """Mask of triangles below a height that face up; sheets, which have no inside, count on either side."""
     sheet = np.array([item.two_sided for item in scene.objects])[scene.triangle_object]
     up = np.where(sheet, np.abs(scene.normals[:, 2]), scene.normals[:, 2])
     return (up > _LYING) & (scene.triangles[:, :, 2].max(axis=1) < below)
 
 
 def between(triangles: Float[np.ndarray, "t 3 3"], low: float, high: float) -> Float[np.ndarray, "s 3 3"]:
-    """The parts of triangles between two heights."""
+    """Clip triangles to the interval between two heights."""
     touching = (triangles[:, :, 2].max(axis=1) >= low) & (triangles[:, :, 2].min(axis=1) <= high)
     corners = triangles[touching].reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Where a ray is inside a rigid part of something that moves."""
+"""Intersection of a ray with a rigid part of a mover."""
 
 import numpy as np
 from numba import njit
@@ -6,18 +6,11 @@ from numba import njit
 
 @njit
 def crossing(origin, way, turn, center, half, capsule):
-    """Where a ray enters a part and where it leaves it, m along the ray; inf and -inf where it misses.
-
-    Args:
-        origin, way: m, and unit direction, world.
-        turn, center: pose of the part: rotation to world, m.
-        half: half extents of a box, m; of a capsule about its z axis: radius, radius, half length (`movers.Part`).
-        capsule: whether it is one.
-    """
+    """Distances along a ray at which it enters and leaves a part, m; inf and -inf if it misses."""
     towards = center - origin
     along = np.dot(towards, way)
     reach = half[2] + half[0] if capsule else np.sqrt(np.dot(half, half))
-    if np.dot(towards, towards) - along * along > reach * reach:  # beside the ball around it
+    if np.dot(towards, towards) - along * along > reach * reach:  # misses the bounding sphere
         return np.inf, -np.inf
     a, d = np.zeros(3), np.zeros(3)  # in the part's own frame
     for k in range(3):
@@ -29,7 +22,7 @@ def crossing(origin, way, turn, center, half, capsule):
 
 @njit
 def _box(a, d, half):
-    """By its three slabs."""
+    """Intersect a box by the slab method."""
     low, high = -np.inf, np.inf
     for k in range(3):
         if abs(d[k]) < 1e-12:
@@ -43,7 +36,7 @@ def _box(a, d, half):
 
 @njit
 def _capsule(a, d, half):
-    """A cylinder about z and a ball at either end, which together are convex."""
+    """Intersect a capsule: a cylinder about z and a sphere at either end, together convex."""
     radius, length = half[0], half[2]
     low, high = np.inf, -np.inf
     across = d[0] * d[0] + d[1] * d[1]

@@ -62,7 +62,7 @@ Factor = Annotated[float, Field(gt=0, le=10)]
 
 
 class Parts(NamedTuple):
-    """What a scene is made of; no name: ""."""
+    """Contents of a scene; without a name: ""."""
 
     name: str
     objects: list[SceneObject]
@@ -133,10 +133,10 @@ class Shape(Strict, ABC):
 
     @abstractmethod
     def mesh(self, folder: Path) -> trimesh.Trimesh:
-        """In world coordinates; files that it names are relative to a folder."""
+        """Mesh in world coordinates; file names in it are relative to a folder."""
 
     def object(self, folder: Path) -> SceneObject:
-        """What stands in the scene."""
+        """Object with this mesh and its material."""
         if isinstance(self.material, CustomMaterial):
             made_of = self.material.custom.material(f"custom {self.name}")
         else:
@@ -327,13 +327,13 @@ class Description(Strict):
 
     @property
     def surface_settings(self) -> SurfaceSettings:
-        """Clutter and roughness: given, or those of a building, or none."""
+        """Clutter and roughness: as given, or the default of a building, or zero."""
         given = {name: getattr(self, name) for name in ("clutter", "unevenness") if getattr(self, name) is not None}
         return replace(IN_USE if self.building else IDEAL, **given)
 
 
 def description_model() -> type[Description]:
-    """The description with all shapes and movers that there are, those of plug-ins included."""
+    """Description with all shapes and movers, those of plug-ins included."""
     plugins.load()
     return _model_of(_kinds(Shape, "shape"), _kinds(Mover, "kind"))
 
@@ -348,7 +348,7 @@ def _model_of(shapes: tuple[type, ...], movers: tuple[type, ...]) -> type[Descri
 
 
 def _kinds(base: type[BaseModel], tag: str) -> tuple[type, ...]:
-    """All subclasses that a scene file can name, in the order in which they were defined."""
+    """All subclasses that a scene file can use, in the order of their definition."""
     found = []
     for each in base.__subclasses__():
         found += ([each] if tag in each.__annotations__ else []) + list(_kinds(each, tag))
@@ -356,16 +356,16 @@ def _kinds(base: type[BaseModel], tag: str) -> tuple[type, ...]:
 
 
 def split_level(name: str | Path) -> tuple[str, int]:
-    """A scene's file or bare name, and the level that it ends in (``corner@2``), 0 if in none."""
+    """Split a scene's file or name from its level (``corner@2``), 0 if there is none."""
     plain, _, level = str(name).rpartition("@")
     return (plain, int(level)) if plain and re.fullmatch(r"\d+", level) else (str(name), 0)
 
 
 def find(path: str | Path) -> Path:
-    """The scene file meant by a path or a bare name, whatever its level.
+    """Find the scene file of a path or a bare name, whatever its level.
 
     Raises:
-        InputError: there is none, with the names that would work.
+        InputError: there is none; the message lists valid names.
     """
     path = split_level(path)[0]
     given = Path(path)
@@ -389,14 +389,14 @@ def find(path: str | Path) -> Path:
 
 
 def shipped() -> Path:
-    """Folder of the scenes that come with the project: in the repository, or beside the installed package."""
+    """Folder of the project's scenes: in the repository, or beside the installed package."""
     here = Path(__file__).resolve()
     packaged = here.parents[1] / "scenes"
     return packaged if packaged.is_dir() else here.parents[2] / "scenes"
 
 
 def meshes(path: Path) -> list[Path]:
-    """The mesh files that a scene file names, at any of its levels.
+    """Mesh files in a scene file, at any of its levels.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key or value.
@@ -408,11 +408,11 @@ def meshes(path: Path) -> list[Path]:
 
 
 def read(path: Path, level: int = 0, changes: Mapping[str, object] | None = None) -> Parts:
-    """Name, objects, movers, surface settings and interferers of a scene file at one of its levels.
+    """Read name, objects, movers, surface settings and interferers of a scene file at one of its levels.
 
     Args:
         path: of the file.
-        level: of severity, where there are some.
+        level: level of severity, if the scene has levels.
         changes: values in place of the file's.
 
     Raises:
@@ -425,13 +425,13 @@ def read(path: Path, level: int = 0, changes: Mapping[str, object] | None = None
 
 
 def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
-    """Name (or ""), objects, movers, surface settings and interferers of a description as read from YAML.
+    """Build name (or ""), objects, movers, surface settings and interferers from a description as read from YAML.
 
     Args:
         data: the description.
-        source: what to call it in errors.
-        folder: mesh files are relative to it.
-        level: of severity, where there are some.
+        source: name of the description in error messages.
+        folder: folder of mesh files.
+        level: level of severity, if the scene has levels.
 
     Raises:
         InputError: unknown key, value, material, mesh file or level.
@@ -454,7 +454,7 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
 
 
 def described(data: object, source: str, level: int = 0) -> Description:
-    """A description as read from YAML, checked, at one of its levels.
+    """Check a description as read from YAML, at one of its levels.
 
     Raises:
         InputError: unknown key, value or level.
@@ -473,7 +473,7 @@ def described(data: object, source: str, level: int = 0) -> Description:
 
 
 def apply_level(data: dict, changes: Level) -> dict:
-    """A description with the changes of a level."""
+    """Apply the changes of a level to a description."""
     parts = {}
     for part in ("objects", "moving", "interferers"):
         parts[part] = entries = [dict(entry) for entry in data.get(part, [])]

@@ -1,4 +1,4 @@
-"""Scenes as meshes for other programs: glTF (``.glb``), PLY, OBJ and STL."""
+"""Export of scenes as meshes for other programs: glTF (``.glb``), PLY, OBJ and STL."""
 
 from pathlib import Path
 
@@ -15,12 +15,12 @@ _Y_UP = trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
 
 
 def export_scene(scene: Scene, output: str | Path) -> Path:
-    """Write a scene's objects as a mesh, m. Clutter and people, which are drawn for every recording, are not in it.
+    """Write a scene's objects as a mesh, m. Clutter points and people, which are drawn per recording, are not included.
 
     Args:
         scene: the world.
-        output: ``.glb``: an object a node, with the material's name and colour, so that `radarsim scene import` reads
-            the materials back; ``.ply``: one mesh with coloured faces; ``.obj`` or ``.stl``: one mesh.
+        output: ``.glb``: one node per object, with the material's name and colour, from which `radarsim scene import`
+            restores the materials; ``.ply``: one mesh with coloured faces; ``.obj`` or ``.stl``: one mesh.
 
     Raises:
         InputError: another suffix, or the file cannot be written.

@@ -1,4 +1,4 @@
-"""What the fields of scene files are made of."""
+"""Field types of scene files."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Other radars that send in a place, as another robot's or a neighbour's does.
+"""Other radars that transmit in a scene, such as another robot's or a neighbour's.
 
 A scene file lists them:
 
@@ -6,7 +6,7 @@ A scene file lists them:
       - {name: neighbour, radar: long-range, position: [6, 2, 1], yaw: 180}
       - {name: robot, radar: {slope: 70e12, idle_time: 90e-6}, position: [9, 1, 0.5], velocity: [-0.5, 0, 0]}
 
-What of them is heard is the business of `radarsim.receiver.interference`.
+`radarsim.receiver.interference` computes their effect.
 """
 
 from typing import Annotated
@@ -27,7 +27,7 @@ Vector = tuple[Number, Number, Number]
 
 
 class Interferer(Strict):
-    """A radar that sends by itself: antennas and power of the board are those of the radar that it disturbs.
+    """Interfering radar. Its antennas and transmit power are those of the radar that it disturbs.
 
     Attributes:
         name: unique name of the radar.
@@ -59,10 +59,10 @@ class Interferer(Strict):
         return PRESETS[radar] if isinstance(radar, str) else radar
 
     def places(self, times: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n 3"]:
-        """Where the board is at times, s; m."""
+        """Position of the board at times, s; m."""
         return np.asarray(self.position) + np.multiply.outer(times, self.velocity)
 
     @property
     def rotation(self) -> Float[np.ndarray, "3 3"]:
-        """Board to world."""
+        """Board-to-world rotation."""
         return Rotation.from_euler("z", self.yaw, degrees=True).as_matrix()

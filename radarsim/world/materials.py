@@ -1,4 +1,4 @@
-"""What surfaces are made of: permittivity, roughness and backscatter at millimetre waves.
+"""Materials of surfaces: permittivity, roughness and backscatter at millimetre waves.
 
 Permittivity follows e^{+jwt}: eps = eps' - j sigma / (w eps0), losses have a negative imaginary part. ITU-R P.2040-4
 gives eps' = a f^b and sigma = c f^d (f in GHz) with bands of validity, read from Sionna RT's own table; where 77 GHz
@@ -32,7 +32,7 @@ from radarize.io.yamlfile import read_beside
 from radarize.radar.config import SPEED_OF_LIGHT
 
 EPS0 = 8.8541878128e-12
-_BAND = 77e9  # Hz, where what is scattered is weighed against what is reflected
+_BAND = 77e9  # Hz, at which diffuse scattering is balanced with reflection
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Material:
         directive, backscatter: shares of the diffuse power in the lobes about the specular direction and back to the
             source; the rest is Lambertian.
         lobe_exponent: alpha of both lobes.
-        clear: light passes, too: cameras and lidars see what is behind.
+        clear: transparent to light: cameras and lidars see through it.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Material:
         return complex(self.permittivity(frequency))
 
     def scaled(self, permittivity: float = 1.0, conductivity: float = 1.0) -> "Material":
-        """The material with eps' (which stays at least 1) and conductivity times factors; a conductor stays as it is.
+        """Scale eps' (which stays at least 1) and conductivity by factors; a conductor is not changed.
 
         Roughness stays, so sigma0 follows the power reflected at normal incidence.
         """
@@ -118,7 +118,7 @@ class Material:
 
 
 def itu_permittivity(name: str, frequency: float) -> complex:
-    """Relative permittivity of an ITU-R P.2040-4 material, between and beyond its bands too.
+    """Relative permittivity of an ITU-R P.2040-4 material, interpolated between and extrapolated beyond its bands.
 
     Inside a band: the recommendation. Between two bands: eps' and log(sigma) linear in log(f) between the facing edges.
     Beyond the last band: the nearest band's power law carried on (eps' is constant in all of these). That is

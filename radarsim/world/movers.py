@@ -1,8 +1,8 @@
-"""Things that move by themselves: people who walk, doors that open, fans that turn.
+"""Moving objects: people who walk, doors that open, fans that turn.
 
-A mover is a set of rigid parts, each a capsule or a box in a frame of its own, with a pose at any time. Its surface
-carries scatterers that move along, and the parts stand in the way of other echoes; those of a material echo and let
-through as things of that material do. A scene file lists them:
+A mover is a set of rigid parts, each a capsule or a box in its own frame, with a pose at any time. Its surface
+carries scatterers, and the parts obstruct other echoes; parts with a material reflect and transmit like
+static objects of that material. A scene file lists them:
 
     moving:
       - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
@@ -34,7 +34,7 @@ class Part:
     Attributes:
         half: half extents along x, y, z of a box, m; of a capsule: (radius, radius, half length of the axis, along z).
         capsule: a capsule, else a box.
-        material: of a box that is a thing like those that stand; None: scatterers of the mover's cross section.
+        material: of a box that acts like a static object; None: scatterers share the mover's cross section.
     """
 
     half: tuple[float, float, float]
@@ -43,22 +43,22 @@ class Part:
 
     @property
     def object(self) -> SceneObject | None:
-        """A part of a material as a thing that stands at the origin."""
+        """Part with a material as an object at the origin."""
         if self.material is None:
             return None
         return SceneObject("part", shapes.box((0, 0, 0), [2 * x for x in self.half]), self.material)
 
     @property
     def area(self) -> float:
-        """Surface, m^2."""
+        """Surface area, m^2."""
         x, y, z = self.half
         return 4 * np.pi * x * (x + z) if self.capsule else 8 * (x * y + y * z + z * x)
 
     def sample(self, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Points (count, 3) spread evenly over the surface, and outward normals."""
+        """Random points (count, 3) with uniform density on the surface, and outward normals."""
         x, y, z = self.half
         if self.capsule:
-            # A sphere, cut at its equator and pulled apart: each half keeps its share of the area.
+            # A sphere, split at its equator: each half keeps its fraction of the area.
             straight = rng.random(count) < z / (x + z)
             normal = rng.normal(size=(count, 3))
             normal[straight, 2] = 0
@@ -76,7 +76,7 @@ class Part:
 
 
 class Mover(Strict, ABC):
-    """What moves by itself. A subclass with a `kind` of its own can be named in scene files.
+    """Moving object. A subclass with its own `kind` can be used in scene files.
 
     Parts of no material share the mover's `cross_section`, m^2; where it has none, they hide and do not echo.
 
@@ -89,7 +89,7 @@ class Mover(Strict, ABC):
 
     @abstractmethod
     def parts(self) -> list[Part]:
-        """The rigid parts."""
+        """Rigid parts of the mover."""
 
     @abstractmethod
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
@@ -97,10 +97,10 @@ class Mover(Strict, ABC):
 
 
 class Person(Mover):
-    """Somebody who walks to and fro along a polyline, arms and legs swinging.
+    """Person who walks to and fro along a polyline, swinging all limbs.
 
-    Ten capsules: trunk, head, upper and lower arms and legs. Hips and shoulders swing as sines at the step frequency,
-    knees bend while the leg comes forward, after the averages of Murray, Drought and Kory (J. Bone Joint Surg. 46-A,
+    Ten capsules: trunk, head, upper and lower limbs. Hips and shoulders swing as sines at the step frequency,
+    knees bend in the swing phase, after the averages of Murray, Drought and Kory (J. Bone Joint Surg. 46-A,
     1964). Cross section: 0 to -8 dBsm is measured for pedestrians at 76 GHz (Yamada, Tanaka and Nishikawa, EuRAD 2005).
 
     Attributes:
@@ -131,7 +131,7 @@ class Person(Mover):
         h = self.height
         place, heading = self._walk(t)
         moving = min(self.speed / 1.3, 1.2) if len(self.path) > 1 else 0.0
-        # A cycle is two steps; people lengthen their steps with speed: 1.4 m a cycle at 1.3 m/s.
+        # A cycle is two steps; its length grows with speed: 1.4 m per cycle at 1.3 m/s.
         phase = 2 * np.pi * t * self.speed / (1.4 * np.sqrt(max(self.speed, 0.1) / 1.3))
         yaw = Rotation.from_rotvec(heading[:, None] * [0.0, 0.0, 1.0])
         pelvis = np.column_stack([place, self.floor + 0.53 * h + 0.02 * moving * np.cos(2 * phase)])
@@ -158,19 +158,19 @@ class Person(Mover):
         return np.stack([r.as_matrix() for r in turns], axis=1), np.stack(centers, axis=1)
 
     def _walk(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Place (n, 2) and heading along the polyline, back and forth.
+        """Position (n, 2) and heading along the polyline, back and forth.
 
-        Both are means over a stretch of the way, so corners are rounded and an about-turn takes nearly a metre.
+        Both are means over a section of the path, so corners are rounded and a turn-around takes nearly a metre.
         """
         path = np.asarray(self.path, float)
         tour = np.concatenate([path, path[-2::-1]])
-        legs = np.diff(tour, axis=0)
-        steps = np.linalg.norm(legs, axis=1)
+        segments = np.diff(tour, axis=0)
+        steps = np.linalg.norm(segments, axis=1)
         if not steps.sum():
             return np.tile(path[0], (len(t), 1)), np.zeros(len(t))
-        legs, steps = legs[steps > 0], steps[steps > 0]
+        segments, steps = segments[steps > 0], steps[steps > 0]
         along = np.concatenate([[0], np.cumsum(steps)])
-        bearing = np.arctan2(legs[:, 1], legs[:, 0])
+        bearing = np.arctan2(segments[:, 1], segments[:, 0])
         turns = np.pi - (np.pi - np.diff(bearing, append=bearing[0]) + 1e-9) % (2 * np.pi)  # about-turns: left
         heading = bearing[0] + np.concatenate([[0], np.cumsum(turns)])
 
@@ -180,14 +180,14 @@ class Person(Mover):
             return distance // along[-1], distance % along[-1], weight / weight.sum()
 
         _, part, weight = over(0.25)
-        place = np.stack([np.interp(part, along, np.append(tour[0, i], tour[0, i] + np.cumsum(legs[:, i]))) @ weight
+        place = np.stack([np.interp(part, along, np.append(tour[0, i], tour[0, i] + np.cumsum(segments[:, i]))) @ weight
                           for i in (0, 1)], axis=-1)  # fmt: skip
         lap, part, weight = over(0.45)
-        leg = np.clip(np.searchsorted(along, part, side="right") - 1, 0, len(legs) - 1)
-        # A tabulated step would jump; the turn at a corner is spread over a fifth of a metre before it is averaged.
-        into = np.clip((part - along[leg]) / 0.2, 0, 1)
-        before = np.where(leg > 0, heading[np.maximum(leg - 1, 0)], heading[-2] - (heading[-1] - heading[0]))
-        bearing = before + into * (heading[leg] - before) + lap * (heading[-1] - heading[0])
+        segment = np.clip(np.searchsorted(along, part, side="right") - 1, 0, len(segments) - 1)
+        # A tabulated step would be discontinuous; a turn is spread over a fifth of a metre before it is averaged.
+        into = np.clip((part - along[segment]) / 0.2, 0, 1)
+        before = np.where(segment > 0, heading[np.maximum(segment - 1, 0)], heading[-2] - (heading[-1] - heading[0]))
+        bearing = before + into * (heading[segment] - before) + lap * (heading[-1] - heading[0])
         return place, bearing @ weight
 
 
@@ -223,7 +223,7 @@ class Door(Mover):
         return name
 
     def parts(self) -> list[Part]:
-        """The leaf."""
+        """The door leaf as a rigid part."""
         return [Part((self.width / 2, self.thickness / 2, self.height / 2), False, material(self.material))]
 
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
@@ -264,7 +264,7 @@ class Fan(Mover):
         return self
 
     def parts(self) -> list[Part]:
-        """The blades."""
+        """The blades as rigid parts."""
         return [Part((0.45 * self.radius, 0.08 * self.radius, 0.004), False)] * self.blades
 
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:

@@ -1,4 +1,4 @@
-"""What stands in a scene: a mesh of one material."""
+"""Objects of a scene: meshes of one material."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,20 +9,20 @@ from jaxtyping import Bool, Float
 
 from radarsim.world.materials import Material
 
-#: m: a mesh that is lower is no room; and as near to its bottom and top are floor and ceiling, which face up and down
-#: by more than this cosine in a scan, too.
+#: m: smallest height of a room's mesh; distance from its bottom and top of faces that are floor and ceiling; and cosine
+#: by which these must face up or down, in a scan, too.
 _ROOM, _LEVEL, _FLAT = 1.8, 0.15, 0.95
 
 
 @dataclass(frozen=True)
 class SceneObject:
-    """One thing of one material.
+    """Object of one material.
 
     Attributes:
         name: unique in its scene.
         mesh: float64 triangles in world coordinates, normals outward (either side reflects).
         material: of all its triangles.
-        solid: part of the surface of a body, though perhaps an open mesh: seen from its outside only.
+        solid: whether it is part of the surface of a body, though perhaps an open mesh: seen from its outside only.
     """
 
     name: str
@@ -43,8 +43,8 @@ class SceneObject:
     def floors_and_ceilings(
         self, place: Float[np.ndarray, "face 3"], normal: Float[np.ndarray, "face 3"]
     ) -> Bool[np.ndarray, "face"]:
-        """Which of its faces, with centres (m) and normals, are floor or ceiling: all, if it has no others; of a room
-        in one mesh, drawn or scanned, those at its bottom that face up and those at its top that face down."""
+        """Mask of its faces, with centres (m) and normals, that are floor or ceiling: all, if it has no others; for a
+        room in one mesh, those at its bottom that face up and those at its top that face down."""
         (low, high), up = self.mesh.bounds[:, 2], normal[:, 2]
         seen_from_within = self.two_sided or (self.mesh.is_watertight and self.mesh.volume < 0)
         if self.is_floor_or_ceiling or high - low < _ROOM or not seen_from_within:

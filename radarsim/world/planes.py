@@ -1,11 +1,11 @@
-"""Flat regions of a mesh, scanned and noisy ones included, and the quadrilaterals that cover them.
+"""Flat regions of a mesh, noisy scans included, and the quadrilaterals that cover them.
 
-A scanned wall is thousands of triangles that lie a millimetre off and a few degrees askew. Each by itself would be a
-mirror that points somewhere else, and the wall would sparkle. So triangles join their neighbours as long as they stay
-near one plane, and the region echoes as that plane. What is left over, the distance of the corners from the plane, is
-an artefact of scanning (half a millimetre RMS would cost 11 dB as roughness), and not told apart from true roughness
-by its size; true roughness is the material's, so the residual is left out of the response altogether. Regions that
-bend within a Fresnel zone are no planes: of them only the exactly flat parts count.
+A scanned wall is thousands of triangles with errors of a millimetre and a few degrees. Each by itself would be a mirror
+with another direction, and the wall would scatter diffusely. So neighbouring triangles are joined as long as they are
+near one plane, and the region reflects as that plane. The residual, the distance of the corners from the plane, is an
+artefact of scanning (half a millimetre RMS would cost 11 dB as roughness) that cannot be distinguished from true
+roughness by its size; true roughness is the material's, so the residual is ignored. In regions that bend within a
+Fresnel zone only the exactly flat parts are planes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,24 +18,24 @@ import trimesh
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
-#: Corners of a region's triangles are within this of its plane, m: six times the 0.5 mm RMS of a good scan.
+#: Largest distance of a region's corners from its plane, m: six times the 0.5 mm RMS of a good scan.
 OFFSET = 3e-3
-#: Normals of a region's triangles are within this of its normal, cosine of 12 deg: below the step of a 24-sided column.
+#: Largest angle of a region's normals, cosine of 12 deg: below the step of a 24-sided column.
 ASKEW = np.cos(np.deg2rad(12))
-#: A region whose radius of curvature is below this bends by more than lambda / 8 in a Fresnel zone at 2 m, m.
+#: Radius of curvature below which a region bends by more than lambda / 8 in a Fresnel zone at 2 m, m.
 STRAIGHT = 2.0
-#: A region that fills this share of its bounding rectangle is taken for it, unless it is one trapezoid: walls that lean
-#: fill all but a thousandth, and meet without an overlap. Other regions are cut into strips.
+#: Fraction of its bounding rectangle from which a region is replaced by it, unless it is one trapezoid: leaning walls
+#: fill all but a thousandth, and must meet without overlap. Other regions are cut into strips.
 SMALLEST_FILL, EXACT_FILL = 0.97, 1 - 1e-6
-#: Straightening an outline changes its area by less than this share.
+#: Largest relative change of area by straightening an outline.
 LOSS = 0.01
-#: Outlines are computed on a grid of this step, m. What is not ten steps wide is left out.
+#: Grid step of outlines, m. Regions narrower than ten steps are left out.
 GRID = 1e-6
 
 
 @dataclass(frozen=True)
 class Plate:
-    """A flat convex quadrilateral, of which two corners may fall together, and a large rectangle in it.
+    """Flat convex quadrilateral, of which two corners may coincide, and a large rectangle in it.
 
     Attributes:
         corners: in order around it, m.
@@ -52,7 +52,7 @@ class Plate:
 
 
 class _Triangles(NamedTuple):
-    """Triangles of one region, or of several regions of as many.
+    """Triangles of one region, or of several regions of equal number.
 
     Attributes:
         corners, center: m.
@@ -69,27 +69,27 @@ class _Triangles(NamedTuple):
 
     @classmethod
     def of(cls, mesh: trimesh.Trimesh) -> "_Triangles":
-        """All of a mesh."""
+        """All triangles of a mesh."""
         return cls(mesh.triangles, mesh.face_normals, mesh.area_faces, mesh.triangles_center, np.asarray(mesh.faces))
 
     def take(self, index: Int[np.ndarray, "*region face"]) -> "_Triangles":
-        """Some of them."""
+        """Select some triangles."""
         return _Triangles(*(column[index] for column in self))
 
 
 def plates(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"], smallest: float) -> list[Plate]:
-    """Quadrilaterals that cover the flat regions of a mesh, arguments as for `plates_of_each`."""
+    """Cover the flat regions of a mesh by quadrilaterals; arguments as for `plates_of_each`."""
     return plates_of_each([(mesh, among)], smallest)[0]
 
 
 def plates_of_each(
     meshes: Sequence[tuple[trimesh.Trimesh, Bool[np.ndarray, "face"]]], smallest: float
 ) -> list[list[Plate]]:
-    """Quadrilaterals that cover the flat regions of each mesh.
+    """Cover the flat regions of each mesh by quadrilaterals.
 
     Args:
-        meshes: triangles that share corners where they join, and which of them to take.
-        smallest: regions of less area are left out, m^2.
+        meshes: triangles that share corners where they join, and the mask of those to use.
+        smallest: smallest area of a region, m^2.
     """
     taken = [m if among.all() else trimesh.Trimesh(m.vertices, m.faces[among], process=False) for m, among in meshes]
     triangles = _Triangles(*map(np.concatenate, zip(*map(_Triangles.of, taken), strict=True)))
@@ -109,7 +109,7 @@ def plates_of_each(
 
 
 def regions(mesh: trimesh.Trimesh) -> list[Int[np.ndarray, "face"]]:
-    """Groups of neighbouring triangles near one plane, by their numbers, those with the largest triangles first."""
+    """Groups of neighbouring triangles near one plane, by index, those with the largest triangles first."""
     pairs = np.concatenate([mesh.face_adjacency, mesh.face_adjacency[:, ::-1]])
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     first = np.searchsorted(pairs[:, 0], np.arange(len(mesh.faces) + 1))
@@ -125,7 +125,7 @@ def regions(mesh: trimesh.Trimesh) -> list[Int[np.ndarray, "face"]]:
 
 @njit(cache=True)
 def _grow(seeds, first, neighbours, triangles, normals, areas):
-    """Region number of each triangle. A region's plane is the mean of its triangles so far, weighted by area."""
+    """Region index of each triangle. A region's plane is the area-weighted mean of its triangles so far."""
     label = np.full(len(triangles), -1)
     queue = np.empty(len(triangles), np.int64)
     regions = 0
@@ -166,7 +166,7 @@ def _plane(some: _Triangles) -> tuple[Float[np.ndarray, "*region 3"], Float[np.n
 
 
 def _frame(normal: Float[np.ndarray, "*region 3"]) -> Float[np.ndarray, "*region 2 3"]:
-    """Two directions in each plane, the first one horizontal where it can be."""
+    """Two directions in each plane, the first one horizontal if possible."""
     u = np.cross([0.0, 0.0, 1.0], normal)
     lying = np.sqrt(np.vecdot(u, u)) < 1e-6
     u = _unit(np.where(lying[..., None], [1.0, 0.0, 0.0], u))
@@ -178,7 +178,7 @@ def _unit(vectors: Float[np.ndarray, "*region 3"]) -> Float[np.ndarray, "*region
 
 
 def _bends(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> bool:
-    """Whether a paraboloid through the corners of a region has a curvature that a radar would notice."""
+    """Whether a paraboloid through the corners of a region has a significant curvature for a radar."""
     if len(faces) < 5:  # n triangles that join have n + 2 corners at most
         return False
     corners = np.unique(mesh.faces[faces])
@@ -205,7 +205,7 @@ def _flat_parts(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> list[I
 
 
 def _cover(some: _Triangles) -> Iterator[tuple[int, Plate]]:
-    """The quadrilateral that each region is, or trapezoids that add up to it, and which region it is of."""
+    """Quadrilateral of each region, or trapezoids that add up to it, and the index of the region."""
     normal, center = _plane(some)
     axes = _frame(normal)
     flat = (some.corners - center[:, None, None]) @ axes[:, None].swapaxes(2, 3)
@@ -239,7 +239,7 @@ def _cover(some: _Triangles) -> Iterator[tuple[int, Plate]]:
 def _strips(
     fill: float, triangles: Float[np.ndarray, "face 3 2"], rectangle: Float[np.ndarray, "4 2"]
 ) -> list[Float[np.ndarray, "4 2"]]:
-    """Trapezoids that add up to triangles, or the rectangle around them that they fill."""
+    """Trapezoids that add up to triangles, or the rectangle around them if they fill it."""
     quads = trapezoids(_smoothed(shapely.union_all(shapely.polygons(triangles), grid_size=GRID)))
     return [rectangle] if fill >= SMALLEST_FILL and len(quads) != 1 else quads
 
@@ -253,9 +253,9 @@ def _rectangles(points: Float[np.ndarray, "n point 2"]) -> Float[np.ndarray, "n 
 def _lone_trapezoids(
     flat: Float[np.ndarray, "n face 3 2"], number: Int[np.ndarray, "n face 3"]
 ) -> tuple[Bool[np.ndarray, "n"], Float[np.ndarray, "n 4 2"]]:
-    """Which convex regions are two triangles that make one trapezoid, and the one that `trapezoids` finds in each.
+    """Mask of convex regions of two triangles that make one trapezoid, and the result of `trapezoids` for each.
 
-    Nearly all faces of furniture in rooms that are not quite square are such; in arrays they take a twentieth.
+    Nearly all faces of furniture in rooms that are not quite square are such; with arrays this is 20 times as fast.
 
     Args:
         flat: corners in the plane, m.
@@ -272,7 +272,7 @@ def _lone_trapezoids(
 
 
 def _between_levels(quad: Float[np.ndarray, "n 4 2"]) -> tuple[Bool[np.ndarray, "n"], Float[np.ndarray, "n 4 2"]]:
-    """Which convex quadrilaterals have two corners at one y and two at another, and these as `_trapezoids` does."""
+    """Mask of convex quadrilaterals with two corners at one y and two at another, and these as in `_trapezoids`."""
     quad = np.take_along_axis(quad, quad[:, :, 1].argsort(axis=1)[:, :, None], axis=1)
     steps = np.diff(quad[:, :, 1], axis=1) > GRID
     low, high = quad[:, :1, 1], quad[:, 2:3, 1]
@@ -287,14 +287,14 @@ def _between_levels(quad: Float[np.ndarray, "n 4 2"]) -> tuple[Bool[np.ndarray, 
 
 
 def _smoothed(region: shapely.Geometry) -> shapely.Geometry:
-    """A region without what its outline's corners are off straight lines, unless that takes more than `LOSS` of it."""
+    """Straighten the outline of a region, unless that changes more than `LOSS` of its area."""
     tolerances = OFFSET / 2.0 ** np.arange(12)
     coarse = (shapely.simplify(region, tolerance) for tolerance in tolerances)
     return next((found for found in coarse if abs(found.area - region.area) < LOSS * region.area), region)
 
 
 def trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
-    """Disjoint trapezoids of the area of a region, holes respected, parallel to x or to y, whichever takes fewer.
+    """Divide a region, holes respected, into disjoint trapezoids parallel to x or to y, whichever gives fewer.
 
     Cuts run through all corners, so straight edges are covered exactly.
     """
@@ -324,9 +324,10 @@ def _trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
 
 
 def inner_rectangle(quad: Float[np.ndarray, "*n 4 2"]) -> Float[np.ndarray, "*n 4"]:
-    """x0 y0 x1 y1 of a large upright rectangle in each trapezoid: as high as it is, or half as high at either end.
+    """x0 y0 x1 y1 of a large axis-aligned rectangle in each trapezoid: of full height, or half the height at either
+    end.
 
-    Half a triangle's area is the most that one can hold.
+    Half a triangle's area is the maximum of an inscribed rectangle.
     """
     flip = (np.abs(quad[..., 1, 1] - quad[..., 0, 1]) > 1e-9)[..., None]  # its parallel sides run along y
     x, y = np.moveaxis(np.where(flip[..., None], quad[..., ::-1], quad), (-1, -2), (0, 1))

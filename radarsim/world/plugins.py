@@ -1,4 +1,4 @@
-"""What other packages add: shapes, movers, sensors and mechanisms, each a file of theirs.
+"""Plug-ins by other packages: shapes, movers, sensors and mechanisms, each in a file of theirs.
 
 A package names its modules in its pyproject.toml, and they are imported when the first scene or sensor is looked up:
 
@@ -6,7 +6,7 @@ A package names its modules in its pyproject.toml, and they are imported when th
     rain = "rain.mechanism"
 
 A module of shapes or movers only defines subclasses of `world.description.Shape` or `world.movers.Mover`; one with a
-sensor enters it in `sensors.suite.SENSORS`, one with a mechanism in `propagation.finder.MECHANISMS`. Boards are YAML
+sensor adds it to `sensors.suite.SENSORS`, one with a mechanism to `propagation.finder.MECHANISMS`. Boards are YAML
 files that a radar's configuration names by path.
 """
 

@@ -1,4 +1,4 @@
-"""The first surface along a ray, things that move included."""
+"""Ray casting to the first surface, moving objects included."""
 
 from functools import cached_property
 
@@ -12,10 +12,10 @@ from radarsim.world.scene import Scene
 
 
 class RayCaster:
-    """Casts rays into a scene as it is at given times.
+    """Casts rays into a scene at given times.
 
     Args:
-        scene: its objects stand still, its movers move.
+        scene: scene with static objects and movers.
     """
 
     def __init__(self, scene: Scene):
@@ -27,9 +27,9 @@ class RayCaster:
 
     @cached_property
     def _behind_glass(self) -> Scene | None:
-        """The scene without its clear panes; None where nothing else is there.
+        """The scene without its clear panes; None if nothing else is left.
 
-        It is one pass of rays; going on from pane to pane took three times that.
+        One pass of rays through it is three times as fast as continuing from pane to pane.
         """
         solid = [o for o in self._scene.objects if not o.material.clear]
         if len(solid) == len(self._scene.objects):
@@ -48,11 +48,11 @@ class RayCaster:
         Args:
             origins: of each frame's rays, world, m.
             directions: world, of unit length.
-            times: at which movers stand where they stand, s.
-            through_glass: see what is behind clear panes, not the panes.
+            times: times of the movers' positions, s.
+            through_glass: ignore clear panes.
 
         Returns:
-            m, inf where there is nothing.
+            Distance, m, inf without a surface.
         """
         frames, rays, _ = directions.shape
         starts = np.broadcast_to(origins[:, None], directions.shape).reshape(-1, 3)
@@ -61,7 +61,7 @@ class RayCaster:
         distance = np.full(len(ways), np.inf) if scene is None else scene.hit(starts, ways, coherent=True)[0]
         distance = distance.reshape(frames, rays)
         if len(self._half):
-            # One instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other.
+            # One time after another: sums over many at once have another order, and a frame must not depend on others.
             placed = [poses(self._scene.movers, np.array([t])) for t in times]
             turn, center = (np.concatenate(parts) for parts in zip(*placed, strict=True))
             met = ~self._clear if through_glass else np.ones(len(self._half), bool)
@@ -72,7 +72,7 @@ class RayCaster:
 
 @njit(parallel=True, cache=True)
 def _meet(origins, directions, turn, center, half, capsule, distance):
-    """Shortens distances to the moving parts that rays enter."""
+    """Shorten distances of rays that enter a moving part."""
     for f in range(len(origins)):
         for i in prange(directions.shape[1]):
             for p in range(len(half)):

@@ -1,7 +1,8 @@
-"""A world of triangles with materials, and the ray tests on it.
+"""Scene of triangles with materials, and its ray tests.
 
-Rays run on the Mitsuba geometry of a Sionna RT scene (Embree on a CPU, one shape per object). It computes in float32:
-within a kilometre of the origin, which is checked, positions are good to 0.06 mm, well under the margin of `occluded`.
+Ray tests use the Mitsuba geometry of a Sionna RT scene (Embree on a CPU, one shape per object) in float32:
+within a kilometre of the origin, which is checked, the error of positions is 0.06 mm, well under the margin of
+`occluded`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,9 +24,9 @@ from radarsim.world.materials import EPS0, Material
 from radarsim.world.objects import SceneObject
 from radarsim.world.surface_settings import IDEAL, SurfaceSettings
 
-FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
+FREQUENCY = 77e9  # initial frequency of Sionna RT's own solvers
 _REACH = 1000.0
-#: Entries of four bytes that a processor's widest instruction takes at a time.
+#: Number of four-byte entries of a processor's widest SIMD instruction.
 _PACKET = 16
 
 
@@ -33,11 +34,11 @@ class Scene:
     """Objects, their triangles in one list, and ray tests.
 
     Args:
-        name: for titles and recordings.
-        objects: with unique names.
-        movers: things that move by themselves (`movers`); ray tests know the objects only.
+        name: name for titles and recordings.
+        objects: objects with unique names.
+        movers: moving objects (`movers`); ray tests use the static objects only.
         surface_settings: clutter and roughness.
-        interferers: other radars that send (`interferers`).
+        interferers: other radars that transmit (`interferers`).
 
     Attributes:
         triangles: (T, 3, 3) corners of all triangles, in the order of the objects, m.
@@ -45,7 +46,7 @@ class Scene:
         triangle_object: (T,) index into `objects`.
 
     Raises:
-        InputError: no object, a name twice, a mesh without triangles or too far away.
+        InputError: no object, a repeated name, or a mesh without triangles or too far away.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class Scene:
         self.normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
 
     def __reduce__(self):
-        """Pickled without the geometry for ray tests, which every process makes for itself."""
+        """Pickle without the geometry for ray tests, which every process builds for itself."""
         return Scene, (self.name, self.objects, self.movers, self.surface_settings, self.interferers)
 
     @classmethod
@@ -86,9 +87,9 @@ class Scene:
         """Read a scene file.
 
         Args:
-            path: a YAML file; a bare name such as ``office`` is looked for as a file here, then in ``scenes/`` here,
-                then among the scenes that come with the project. ``NAME@2`` is level 2 of a scene that has levels.
-            changes: values in place of the file's (``{"clutter": 1.2}``).
+            path: a YAML file; a bare name such as ``office`` is searched as a file here, then in ``scenes/`` here,
+                then among the project's scenes. ``NAME@2`` is level 2 of a scene that has levels.
+            changes: values that replace the file's (``{"clutter": 1.2}``).
 
         Raises:
             InputError: missing file, malformed YAML, unknown key, material or level, missing mesh; with file and field.
@@ -97,7 +98,7 @@ class Scene:
 
     @classmethod
     def of(cls, description: dict, name: str) -> "Scene":
-        """The scene of a description without a file: ``Scene.of({"building": {"kind": "A", "seed": 3}}, "a3")``.
+        """Build a scene from a description without a file: ``Scene.of({"building": {"kind": "A", "seed": 3}}, "a3")``.
 
         Args:
             description: as in a scene file; mesh files are relative to the working directory.
@@ -116,7 +117,7 @@ class Scene:
 
     @cached_property
     def sionna(self):
-        """The same world as a `sionna.rt.Scene` with radio materials; its `mi_scene` answers the ray tests.
+        """The scene as a `sionna.rt.Scene` with radio materials; its `mi_scene` performs the ray tests.
 
         Raises:
             InputError: no usable LLVM.
@@ -125,7 +126,7 @@ class Scene:
 
     @cached_property
     def _geometry(self):
-        """The Sionna scene, and the first triangle of the shape that has each Mitsuba registry number."""
+        """The Sionna scene, and the first triangle of the shape with each Mitsuba registry number."""
         llvm.require()
         import drjit as dr
         import mitsuba as mi
@@ -154,7 +155,7 @@ class Scene:
         self, origins: Float[np.ndarray, "*#n 3"], targets: Float[np.ndarray, "*#n 3"], margin: float = 1e-3
     ) -> Bool[np.ndarray, "*#n"]:
         """Whether anything lies on the segment from origin to target, both ends shortened by `margin` (m)."""
-        geometry = self.sionna.mi_scene  # before Dr.Jit is loaded: it looks at the machine's LLVM
+        geometry = self.sionna.mi_scene  # before Dr.Jit is loaded: this selects the LLVM
         import mitsuba as mi
 
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
@@ -170,9 +171,9 @@ class Scene:
     ) -> tuple[Float[np.ndarray, "*#n"], Int[np.ndarray, "*#n"]]:
         """Distance along each ray to the first triangle (inf: none) and that triangle's index (-1: none).
 
-        `coherent` says that neighbours in the list are neighbours in space, as a picture's rays are: twice as fast.
+        `coherent`: neighbours in the list are neighbours in space, as a picture's rays are; twice as fast.
         """
-        scene, first = self._geometry  # before Dr.Jit is loaded: it looks at the machine's LLVM
+        scene, first = self._geometry  # before Dr.Jit is loaded: this selects the LLVM
         import drjit as dr
         import mitsuba as mi
 
@@ -192,23 +193,23 @@ class Scene:
 
     @cached_property
     def floors_and_ceilings(self) -> Bool[np.ndarray, "triangle"]:
-        """Which of its triangles are floor or ceiling."""
+        """Mask of the triangles that are floor or ceiling."""
         edges = np.cumsum([0, *(len(item.mesh.faces) for item in self.objects)])
         parts = zip(self.objects, edges, edges[1:], strict=False)
         middle = self.triangles.mean(axis=1)
         return np.concatenate([o.floors_and_ceilings(middle[a:b], self.normals[a:b]) for o, a, b in parts])
 
     def cut(self, height: float) -> tuple[Float[np.ndarray, "n 2 2"], Int[np.ndarray, "n"]]:
-        """What the plane z = `height` cuts: ends of segments, m, and the triangle that each is of."""
+        """Intersection with the plane z = `height`: ends of segments, m, and the triangle of each."""
         mesh = shapes.loose(self.triangles)
-        # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
+        # A cut through an edge or a horizontal face is ill defined, so it is shifted by a nanometre.
         lines, faces = trimesh.intersections.mesh_plane(mesh, [0, 0, 1], [0, 0, height + 1e-9], return_faces=True)
         lines = np.round(np.asarray(lines, float)[..., :2].reshape(-1, 2, 2), 6)
         some = np.any(lines[:, 0] != lines[:, 1], axis=1)
         return lines[some], np.asarray(faces, int)[some]
 
     def floor_plan(self, height: float) -> Float[np.ndarray, "n 4"]:
-        """Everything cut by the plane z = `height`, as segments x0 y0 x1 y1 in m; collinear pieces are joined."""
+        """Intersection with the plane z = `height` as segments x0 y0 x1 y1 in m; collinear pieces are joined."""
         lines, _ = self.cut(height)
         if not len(lines):
             return np.zeros((0, 4))
@@ -223,7 +224,7 @@ class Scene:
 def _lent_rays(
     origins: Float[np.ndarray, "n 3"], ways: Float[np.ndarray, "n 3"], margin: float
 ) -> Float32[np.ndarray, "7 n"]:
-    """Origins, unit directions and lengths of rays along ways, both ends shortened by `margin`, m; see `_room`."""
+    """Origins, unit directions and lengths of rays along vectors, both ends shortened by `margin`, m; see `_room`."""
     rays = _room((7, len(ways)), np.float32)
     _aim(np.ascontiguousarray(origins), np.ascontiguousarray(ways), margin, rays)
     return rays
@@ -242,15 +243,15 @@ def _aim(origins, ways, margin, rays):
 
 
 def _lent(values: np.ndarray, dtype: type) -> np.ndarray:
-    """An array as Dr.Jit may have it, see `_room`."""
+    """Array in memory that Dr.Jit can read, see `_room`."""
     found = _room(values.shape, dtype)
     found[...] = values
     return found
 
 
 def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
-    """An array with room after its end: Dr.Jit reads NumPy's memory where it lies, in whole packets, and where the end
-    of an array is the end of what the process may read, that would be its end, too."""
+    """Array with padding at its end: Dr.Jit reads NumPy's memory in place in whole packets, which could otherwise
+    extend beyond the memory that the process may read."""
     size = int(np.prod(shape))
     room: np.ndarray = np.empty(size + _PACKET, dtype)
     room[size:] = 0
@@ -258,7 +259,7 @@ def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
 
 
 def _radio_material(material: Material) -> object:
-    """Sionna's counterpart: permittivity as here, roughness as a Lambertian share of the reflected amplitude."""
+    """Sionna's equivalent of a material: the same permittivity, roughness as a Lambertian part of the reflection."""
     import drjit as dr
     import mitsuba as mi
     import sionna.rt as rt

@@ -30,14 +30,14 @@ _FACES = {
 
 
 def mesh(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimesh:
-    """A mesh exactly as given, equal vertices merged, nothing reordered or repaired."""
+    """Build a mesh exactly as given, with equal vertices merged, nothing reordered or repaired."""
     result = trimesh.Trimesh(np.asarray(vertices, float), np.asarray(faces), process=False)
     result.merge_vertices(digits_vertex=9)
     return result
 
 
 def exact(vertices: ArrayLike, faces: ArrayLike) -> trimesh.Trimesh:
-    """A mesh of vertices that are known to be different."""
+    """Build a mesh of vertices that are known to be different."""
     return trimesh.Trimesh(np.asarray(vertices, float), np.array(faces), process=False)
 
 
@@ -81,7 +81,7 @@ def rectangle(center: Vector, size: tuple[float, float], facing: Vector) -> trim
 def cylinder(
     center: Vector, radius: float, height: float, sides: int = 12, without: tuple[str, ...] = ()
 ) -> trimesh.Trimesh:
-    """Upright prism with `sides` facets around, `without` its lower (``"-z"``) or upper (``"+z"``) cap."""
+    """Vertical prism with `sides` facets around, `without` its lower (``"-z"``) or upper (``"+z"``) cap."""
     angle = 2 * np.pi * np.arange(sides) / sides
     ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
     low = np.column_stack([ring, np.full(sides, -height / 2)])
@@ -97,7 +97,7 @@ def cylinder(
 
 
 def sphere(center: Vector, radius: float, subdivisions: int = 3) -> trimesh.Trimesh:
-    """Icosphere."""
+    """Icosphere of a radius, m."""
     result = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     result.apply_translation(center)
     return result
@@ -122,13 +122,13 @@ def placed(
     position: Vector = (0, 0, 0),
     rotation: Vector = (0, 0, 0),
 ) -> trimesh.Trimesh:
-    """A copy, rotated by roll, pitch, yaw (rad; about x, then y, then z) about the origin and moved to `position`."""
+    """Copy, rotated by roll, pitch, yaw (rad; about x, then y, then z) about the origin and moved to `position`."""
     turn = Rotation.from_euler("xyz", rotation).as_matrix()
     return trimesh.Trimesh(shape.vertices @ turn.T + np.asarray(position, float), shape.faces.copy(), process=False)
 
 
 def joined(*shapes: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Several meshes as one."""
+    """Join several meshes to one."""
     offsets = np.cumsum([0] + [len(s.vertices) for s in shapes[:-1]])
     faces = [s.faces + offset for s, offset in zip(shapes, offsets, strict=True)]
     return trimesh.Trimesh(np.concatenate([s.vertices for s in shapes]), np.concatenate(faces), process=False)
@@ -141,21 +141,21 @@ def areas(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n"]:
 
 
 def scattered(corners: Float[np.ndarray, "n 3 3"], rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
-    """A random place on each of some triangles, m."""
+    """Draw a random point on each of some triangles, m."""
     share = rng.random((len(corners), 2))
     share[share.sum(axis=1) > 1] = 1 - share[share.sum(axis=1) > 1]  # the other half of the parallelogram
     return corners[:, 0] + np.einsum("nk,nkd->nd", share, corners[:, 1:] - corners[:, :1])
 
 
 def loose(triangles: Float[np.ndarray, "t 3 3"]) -> trimesh.Trimesh:
-    """Triangles as a mesh in which no two share a corner."""
+    """Mesh of triangles that share no corners."""
     return trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
 
 
 def closest(
     triangles: Float[np.ndarray, "t 3 3"], points: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-    """Distance from points to the nearest of some triangles, m, and which it is."""
+    """Distance from points to the nearest of some triangles, m, and its index."""
     world, tensor = tested(triangles)
     query = np.asarray(points, np.float32)
     found = world.compute_closest_points(tensor(query))
@@ -164,7 +164,7 @@ def closest(
 
 
 def tested(triangles: Float[np.ndarray, "t 3 3"]) -> tuple[Any, Callable[[np.ndarray], Any]]:
-    """Open3D's ray and distance tests on triangles, and what makes tensors for them."""
+    """Open3D's ray and distance tests on triangles, and the function that makes their tensors."""
     import open3d
 
     world, tensor = open3d.t.geometry.RaycastingScene(), open3d.core.Tensor.from_numpy

@@ -1,9 +1,9 @@
-"""Corners that are not quite square, walls that are not quite upright: how rooms are built.
+"""Deviation of buildings from right angles: walls that are neither quite square nor quite vertical.
 
-DIN 18202, table 2, allows a right angle 6 mm over a metre and 8 mm over three: 0.15 to 0.35 deg. A building with
-unevenness is sheared as a whole, by angles of that size that its seed draws: planes stay planes and meet where they
-met, but the mirrors of a corner are no longer square, so that its two images of the radar part (by 2 sin(2 a) of the
-distance from the edge) and beat with one another as the radar moves.
+DIN 18202, table 2, tolerates 6 mm over a metre and 8 mm over three for a right angle: 0.15 to 0.35 deg. A building with
+unevenness is sheared as a whole, by random angles of that size: planes stay planes and meet at the same
+edges, but the mirrors of a corner are no longer square, so that its two images of the radar separate (by 2 sin(2 a) of
+the distance from the edge) and beat with one another as the radar moves.
 """
 
 from dataclasses import replace
@@ -13,24 +13,24 @@ from jaxtyping import Float
 
 from radarsim.world.objects import SceneObject
 
-#: Least and largest angle at level 1, rad: between walls, and of walls from upright.
+#: Smallest and largest angle at level 1, rad: between walls, and of walls from the vertical.
 CORNER, LEAN = np.deg2rad((0.1, 0.5)), np.deg2rad((0.05, 0.2))
 
 
 def shear(unevenness: float, seed: int) -> Float[np.ndarray, "3 3"]:
-    """What a building's places are multiplied by; floors stay level."""
+    """Matrix by which a building's coordinates are multiplied; floors stay horizontal."""
     rng = np.random.default_rng([seed, 18202])
     corner, *lean = np.tan(unevenness * rng.uniform(*np.transpose([CORNER, LEAN, LEAN])) * rng.choice([-1, 1], 3))
     return np.array([[1.0, corner, lean[0]], [0.0, 1.0, lean[1]], [0.0, 0.0, 1.0]])
 
 
 def out_of_square(objects: list[SceneObject], unevenness: float, seed: int) -> list[SceneObject]:
-    """A building as it was built, sheared about the middle of its floor.
+    """Shear a building about the middle of its floor.
 
     Args:
-        objects: as drawn.
-        unevenness: of `SurfaceSettings`; 0: as drawn, to the bit.
-        seed: of the building.
+        objects: objects as drawn.
+        unevenness: see `SurfaceSettings`; 0: bit-identical to the drawing.
+        seed: seed of the building.
     """
     if unevenness == 0:
         return objects

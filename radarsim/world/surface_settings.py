@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SurfaceSettings:
-    """How far surfaces are from their drawing, as shares of what is usual.
+    """Deviations of surfaces from their drawing, relative to the usual.
 
     Attributes:
         clutter: objects on walls, desks and shelves and under ceilings: down to 2 cm as geometry
@@ -20,5 +20,5 @@ class SurfaceSettings:
 
 #: Bare, flat and square.
 IDEAL = SurfaceSettings()
-#: As in rooms that are furnished and in use.
+#: Typical of rooms that are furnished and in use.
 IN_USE = SurfaceSettings(1.0, 1.0)

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with something that a user wrote, as one sentence."""
+"""Pydantic's validation errors as one sentence for the user."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ from radarize.io.errors import InputError
 
 @contextmanager
 def naming(where: str, data: object = None) -> Iterator[None]:
-    """Begin sentences about what is wrong with the place that they are about; those of pydantic are about `data`."""
+    """Prefix validation errors with the place where they occur; pydantic's errors refer to `data`."""
     try:
         yield
     except ValidationError as error:
@@ -21,13 +21,13 @@ def naming(where: str, data: object = None) -> Iterator[None]:
 
 
 def format_validation_error(error: ValidationError, data: object) -> str:
-    """The first thing that is wrong, with its place in `data`, the value found there and what was expected."""
+    """Describe the first error in one sentence: its place in `data`, the value found there and the expectation."""
     problem = error.errors()[0]
     kind, loc = problem["type"], problem["loc"]
     field, owner = "", ""
     here: Any = data
     for part in loc:
-        # Parts that are not there tell which branch of a union was tried, unless it is they that miss or that are odd.
+        # Missing parts show which branch of a union was tried, unless the error is that they are missing or unknown.
         missing = isinstance(here, dict) and kind == "missing" and part == loc[-1]
         within = isinstance(here, list | tuple) and isinstance(part, int) and part < len(here)
         there = part in here if isinstance(here, dict) else within

@@ -15,7 +15,7 @@ SPEED = 0.5
 
 @pytest.fixture(scope="package")
 def walk(tmp_path_factory) -> Path:
-    """``walk.h5``, 24 frames of even motion in a small place, beside ``RUN``, its run."""
+    """Recording ``walk.h5`` of 24 frames of uniform motion in a small room, beside its run ``RUN``."""
     folder = tmp_path_factory.mktemp("face")
     times = np.arange(0, 0.9, 0.02)
     poses = planar_poses(np.column_stack([1 + SPEED * times, np.full_like(times, 1.0), np.zeros_like(times)]))

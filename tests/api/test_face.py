@@ -47,7 +47,7 @@ def test_docstrings_say_what_comes_out_and_what_goes_wrong(name):
 
 @pytest.mark.parametrize("package", ["radarize", "radarsim"])
 def test_type_checkers_see_what_is_there(package):
-    """What is imported for them is what the module offers, from the same places."""
+    """Names imported for type checkers are those of the module, from the same modules."""
     tree = ast.parse((ROOT / package / "__init__.py").read_text())
     (shown,) = (n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")
     places = {alias.asname: (node.module, alias.name) for node in shown.body for alias in node.names}
@@ -72,7 +72,7 @@ def test_what_is_not_there_is_an_attribute_error():
 
 
 def test_odometry_stays_a_package():
-    """Whatever was imported first."""
+    """The function and the package of the name `odometry` are the same in any order of imports."""
     from radarize.odometry import uncertainty
 
     assert rz.odometry.uncertainty is uncertainty and callable(rz.odometry)

@@ -63,7 +63,7 @@ PAIRS = {
     ),
     "radarsim simulate": (radarsim.simulate, defaults(planned) | of_fields(Walk), {}),
 }
-#: What a command takes where nothing is said, and the function does not, and why.
+#: Options with different defaults in command and function, and why.
 OTHERWISE = {
     ("radarize import", "output"): "a command leaves a file",
     ("radarize calibrate", "output"): "a command leaves a file",

@@ -78,7 +78,7 @@ def test_maps_are_those_of_the_pipeline(rec):
 
 
 def test_axes_are_metres_and_metres_a_second(rec):
-    """What lies at an azimuth closes at the speed of the radar times its cosine."""
+    """A static echo at an azimuth closes at the radar's speed times the cosine of the azimuth."""
     power = rz.doppler_azimuth(rec).mean("frame")
     ahead = power.where((abs(power.doppler) > 0.2) & (abs(power.azimuth) < 0.9), drop=True)  # the leakage stands still
     speed = ahead.idxmax("doppler") / np.cos(ahead.azimuth)
@@ -105,7 +105,7 @@ def test_odometry_and_run_agree(rec):
 
 
 def test_a_part_of_a_recording_runs_as_one(rec):
-    """Truth beside the right frames, and every second frame."""
+    """Truth belongs to the correct frames, also with every second frame."""
     part, half = rz.run(rec[8:], **PLAIN), rz.run(rec[1:20:2], **PLAIN)
     middle = rec.config.burst_center
     assert part.scans.time.values == pytest.approx(rec.times[8:] + middle)
@@ -244,7 +244,7 @@ def test_what_has_no_samples_or_truth_says_so(rec, tmp_path, axes):
 
 # --- live ----------------------------------------------------------------------------------------------------------
 def test_live_frames_follow_the_radar(rec, walk, tmp_path):
-    """Poses and maps as they come; who leaves the loop has a whole recording, and torch its threads."""
+    """Poses and maps arrive during the loop; leaving it keeps a complete recording and restores torch's threads."""
     threads, seen = torch.get_num_threads(), []
     for frame in rz.live(replay=walk, output=tmp_path / "kept.h5", every=1, **PLAIN):
         seen.append(frame)

@@ -98,5 +98,5 @@ def test_pictures_without_anything(pictured, tmp_path):
     """Nothing seen is a result, too, and it says so."""
     run(pictured, tmp_path / "r")
     folder = RunFolder(tmp_path / "r")
-    assert folder.blind.share_of_way == 0 or folder.warnings
+    assert folder.unobservable_spans.share_of_way == 0 or folder.warnings
     assert len(folder.trajectory[0]) == 6

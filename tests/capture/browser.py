@@ -16,7 +16,7 @@ _FLAGS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-backgro
 
 
 class Leaving(Exception):
-    """The page is left for another, and answers nothing."""
+    """The page is replaced by another and does not answer."""
 
 
 class Browser:

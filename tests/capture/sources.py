@@ -1,4 +1,4 @@
-"""Sources for streams in tests; they run in processes of their own, which import this module."""
+"""Sources of streams for tests; they run in separate processes, which import this module."""
 
 import os
 import time
@@ -12,12 +12,12 @@ from radarize.radar.config import RadarConfig
 
 
 def frame(config: RadarConfig, number: int) -> np.ndarray:
-    """Samples by which a frame is known again."""
+    """Samples that identify a frame."""
     return np.full(config.frame_shape, number, np.int16)
 
 
 def count(outlet: Outlet, config: RadarConfig, frames: int, pause: float = 0.0) -> None:
-    """Frames one after another."""
+    """Yield frames with consecutive numbers."""
     outlet.ready()
     for number in range(frames):
         outlet.put(number * config.frame_period, frame(config, number), np.ones(config.frame_shape[:2], bool))
@@ -26,19 +26,19 @@ def count(outlet: Outlet, config: RadarConfig, frames: int, pause: float = 0.0) 
 
 
 def fail(outlet: Outlet) -> None:
-    """A source with a reason."""
+    """Source that fails with a reason."""
     outlet.ready()
     raise InputError("the file is damaged")
 
 
 def die(outlet: Outlet) -> None:
-    """A source that is killed."""
+    """Source that is killed."""
     outlet.ready()
     os._exit(9)
 
 
 def wait(outlet: Outlet) -> None:
-    """A source that nothing comes from."""
+    """Source without frames."""
     outlet.ready()
     while not outlet.stopped:
         time.sleep(0.01)

@@ -1,4 +1,4 @@
-"""Commands to a DCA1000 that answers, refuses, or is not there."""
+"""Commands to a DCA1000 that answers, refuses, or is absent."""
 
 import socket
 import threading
@@ -13,7 +13,7 @@ from tests.virtual import SMALL, network
 
 
 class Scripted:
-    """A board that replies as told; ignores the first `deaf` requests."""
+    """A board that sends given replies; ignores the first `deaf` requests."""
 
     def __init__(self, statuses: dict[int, int] | None = None, deaf: int = 0):
         self.network, self.asked = network(), []
@@ -33,7 +33,7 @@ class Scripted:
         self._thread.join()
         self._socket.close()
 
-    def say(self, reply: bytes) -> None:
+    def send(self, reply: bytes) -> None:
         self._socket.sendto(reply, (self.network.host, self.network.command_port))
 
     def _serve(self) -> None:
@@ -44,9 +44,9 @@ class Scripted:
                 continue
             self.asked.append(request)
             if len(self.asked) > self._deaf:
-                self.say(Reply(Opcode.STATUS, 0).encode())  # not what was asked for
-                self.say(b"\x5a\xa5")
-                self.say(Reply(request.command, self._statuses.get(request.command, 0)).encode())
+                self.send(Reply(Opcode.STATUS, 0).encode())  # not what was asked for
+                self.send(b"\x5a\xa5")
+                self.send(Reply(request.command, self._statuses.get(request.command, 0)).encode())
 
 
 def test_configuration_in_the_order_of_the_manual():
@@ -121,16 +121,16 @@ def test_a_forged_failure_and_noise_stop_nothing():
             for data in (Reply(Opcode.START, 1).encode(), b"noise"):
                 forger.sendto(data, (board.network.host, board.network.command_port))
         client.start()
-        board.say(b"noise")
-        board.say(Reply(Opcode.STATUS, Status.NO_LVDS).encode())
+        board.send(b"noise")
+        board.send(Reply(Opcode.STATUS, Status.NO_LVDS).encode())
         assert client.status(0.2) == Status.NO_LVDS  # what comes after a datagram that cannot be read is heard
 
 
 def test_what_the_board_reports_on_its_own():
     with Scripted() as board, CaptureCard(board.network) as client:
         assert client.troubles() == []
-        board.say(Reply(Opcode.STATUS, Status.NO_LVDS).encode())
-        board.say(Reply(Opcode.STATUS, Status.RECORD_COMPLETED).encode())
+        board.send(Reply(Opcode.STATUS, Status.NO_LVDS).encode())
+        board.send(Reply(Opcode.STATUS, Status.RECORD_COMPLETED).encode())
         assert client.status(0.2) == Status.NO_LVDS | Status.RECORD_COMPLETED
         assert len(client.troubles()) == 1 and "ribbon cable" in client.troubles()[0]
 

@@ -1,4 +1,4 @@
-"""From serial port and UDP to a recording, against the virtual sensor: what was sent is what was recorded."""
+"""From serial port and UDP to a recording, with the virtual sensor: the recording equals the transmitted samples."""
 
 import signal
 import socket
@@ -31,7 +31,7 @@ FRAMES = 100
 
 @pytest.fixture
 def impatient(monkeypatch):
-    """Streams end early; yet not before the board's last packet, which is 2 s late."""
+    """Streams end early, but after the board's last packet, which is 2 s late."""
     monkeypatch.setattr(stream, "SILENCE", 2.5)
 
 
@@ -42,7 +42,7 @@ def played(tmp_path_factory):
 
 
 def test_every_sample_arrives(played, tmp_path):
-    """Twice with one sensor: a radar that was stopped starts anew."""
+    """Twice with one sensor: a stopped radar starts again."""
     source, sent = played
     with emulated(source) as (emulator, where):
         for name in ("first.h5", "second.h5"):
@@ -85,7 +85,8 @@ def test_lost_late_repeated_and_reordered_packets_over_the_network(played, tmp_p
 
 
 def test_each_of_ten_thousand_packets_lands_in_its_place():
-    """1 % lost, 1 % twice, 1 % overtaken: exactly the chirps of lost packets are marked, only their bytes are zero."""
+    """1 % lost, 1 % duplicated, 1 % reordered: exactly the chirps of lost packets are marked, and only their bytes are
+    zero."""
     config = PRESETS["radarize"]
     sent = np.random.default_rng(0).integers(1, 2**15, (102, *config.frame_shape), dtype=np.int16)
     sequence = encode(sent, config).tobytes()
@@ -138,7 +139,7 @@ def test_interrupting_the_command_leaves_a_whole_file(played, tmp_path):
 
 
 def test_nothing_comes(played, tmp_path, impatient):
-    """A board that answers, but sends its samples elsewhere."""
+    """A board that answers, but sends its samples to another address."""
     source, _ = played
     elsewhere = network()
     with emulated(source) as (emulator, where):
@@ -157,14 +158,14 @@ def test_settings_that_no_radar_takes():
         Sensor(config, write_cfg(config), "a.cfg", "/dev/null", network=network())
 
 
-def test_small_buffers_are_told():
+def test_small_buffers_give_a_warning():
     assert buffer_warning(64 << 20, PRESETS["radarize"]) == []
     (words,) = buffer_warning(208 << 10, PRESETS["radarize"])
     assert "holds 208 KiB, a quarter of a second needs 1080" in words and "sysctl net.core.rmem_max" in words
 
 
 def test_a_stranger_who_never_stops_does_not_keep_a_capture_from_ending(played, tmp_path):
-    """Packets from elsewhere, always within the time that a capture waits for the board's last ones."""
+    """Foreign packets, always within the timeout of the board's last ones."""
     path, adc = played
     ended = threading.Event()
 

@@ -1,4 +1,4 @@
-"""The check of a stream's first seconds."""
+"""Check of a stream's first seconds."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def test_noise_is_named_once_the_stream_ends():
     assert any("noise" in words for words in looked(12).warnings())
 
 
-def test_a_check_that_fails_says_so(monkeypatch):
+def test_a_failing_check_is_reported(monkeypatch):
     def fails(evidence):
         raise ZeroDivisionError("division by zero")
 
@@ -31,5 +31,5 @@ def test_a_check_that_fails_says_so(monkeypatch):
     assert looked(3).warnings() == ["the first seconds could not be checked (division by zero)"]
 
 
-def test_of_no_frame_nothing_is_said():
+def test_without_frames_there_is_no_remark():
     assert looked(0).warnings() == []

@@ -1,4 +1,4 @@
-"""Packets whose headers are damaged or forged: the stream goes on, and nothing real is lost for them."""
+"""Packets with damaged or forged headers: the stream continues, and no real packet is lost."""
 
 from types import SimpleNamespace
 
@@ -22,7 +22,7 @@ def forged(offset: float) -> Packet:
 
 
 def assembled(stream) -> tuple[np.ndarray, np.ndarray, FrameAssembler]:
-    """Frames, which of their chirps are whole, and what made them."""
+    """Frames, masks of whole chirps, and the assembler."""
     assembler = FrameAssembler(SMALL)
     frames = [frame for packet in stream for frame in assembler.add(packet)] + list(assembler.finish())
     assert assembler.counts.packets == len(stream)
@@ -31,7 +31,7 @@ def assembled(stream) -> tuple[np.ndarray, np.ndarray, FrameAssembler]:
 
 
 def with_forged(places: dict[int, list[Packet]]) -> list[Packet]:
-    """The stream with packets put in before those of some numbers."""
+    """Stream with packets inserted before those of some numbers."""
     return [each for number, packet in enumerate(SENT) for each in (*places.get(number, ()), packet)]
 
 
@@ -55,7 +55,7 @@ def test_what_lies_far_away_is_left_out(places):
     assert "far from all others" in assembler.counts.warnings()[0]
 
 
-def test_a_gap_is_believed_when_several_packets_agree():
+def test_a_gap_is_accepted_when_several_packets_agree():
     left = [packet for packet in SENT if not 300 < packet.sequence <= 1500]  # 1.7 MB
     adc, valid, assembler = assembled(left)
     assert len(adc) == len(FRAMES) and np.array_equal(adc[valid], FRAMES[valid])
@@ -63,7 +63,7 @@ def test_a_gap_is_believed_when_several_packets_agree():
 
 
 def test_nothing_is_further_than_the_radar_can_have_come(monkeypatch):
-    """Six packets 12 s ahead agree in a pause of the stream; the clock says that they cannot be."""
+    """Six packets 12 s ahead agree in a pause of the stream; the clock excludes them."""
     origin = Origin("board", SMALL)
     frames, now = [], 0.0
     monkeypatch.setattr(receiver, "time", SimpleNamespace(monotonic=lambda: now))
@@ -77,7 +77,7 @@ def test_nothing_is_further_than_the_radar_can_have_come(monkeypatch):
 
 
 def test_one_port_of_the_board_is_heard():
-    """A forger's packets lie where the real ones do, from before their first one on."""
+    """Forged packets have the positions of real ones, and start before the first of these."""
     origin = Origin("board", SMALL)
     frames, false = [], 0
     for packet in SENT:

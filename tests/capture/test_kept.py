@@ -1,4 +1,5 @@
-"""Whatever ends a capture, what came is kept, and what was captured is not replaced unasked."""
+"""A capture keeps the received frames however it ends, and does not replace an existing recording without
+permission."""
 
 import errno
 import os
@@ -34,7 +35,7 @@ RADAR = {"source": "radar at /dev/ttyACM0, DCA1000 at 192.168.33.180"}
 
 
 class Played:
-    """A stream of batches, in which something may go wrong."""
+    """Stream of batches with optional faults."""
 
     config, text, facts, packets = SMALL, "", RADAR, PacketCounts()
 
@@ -80,7 +81,7 @@ def test_whatever_goes_wrong(tmp_path, wrong, words):
 
 
 class OnSmallDisk(Played):
-    """A stream; somebody else fills the disk before its third batch of four, and makes room before the last."""
+    """Stream during which the disk is filled before the third batch of four, and freed before the last."""
 
     def __init__(self, disk):
         super().__init__()
@@ -95,7 +96,8 @@ class OnSmallDisk(Played):
 
 
 def test_a_disk_that_fills_and_empties(small_disk, capsys):
-    """What was appended before is kept, although HDF5 writes it later; what comes while it is full is left out."""
+    """Appended frames are kept, although HDF5 writes them later; frames that arrive while the disk is full are left
+    out."""
     captured(small_disk / "a.h5", OnSmallDisk(small_disk))
     assert "no space left on the device; frames are left out, for up to 60 s" in capsys.readouterr().err
     kept = [*range(10), *range(15, 20)]
@@ -109,7 +111,7 @@ def test_a_disk_that_fills_and_empties(small_disk, capsys):
 
 
 def test_a_disk_that_others_fill_at_once(small_disk):
-    """What was appended has its place: a recording ends whole on a disk without a free byte."""
+    """Space of appended frames is allocated: a recording is completed on a full disk."""
     with RecordingWriter(small_disk / "a.h5", SMALL) as writer:
         writer.append(ADC[:10], np.arange(10.0))
         fill(small_disk / "taken")
@@ -118,15 +120,15 @@ def test_a_disk_that_others_fill_at_once(small_disk):
 
 
 def test_a_disk_that_stays_full(tmp_path, monkeypatch):
-    """Not even its end can be written: what is left is named, and can be rescued later."""
+    """Not even the end can be written: the partial file is named, and can be recovered later."""
     free = [None] * 3  # for the first frames
 
-    def claim(*_):
+    def allocate(*_):
         if not free:
             raise OSError(errno.ENOSPC, "No space left on device")
         free.pop()
 
-    monkeypatch.setattr(writer_module.os, "posix_fallocate", claim)
+    monkeypatch.setattr(writer_module.os, "posix_fallocate", allocate)
     monkeypatch.setattr(record_module, "PATIENCE", 0.0)
     with pytest.raises(InputError, match=r"no space left.*kept in .*a.h5.part, of which radarize recover .*a.h5.part"):
         captured(tmp_path / "a.h5")
@@ -151,7 +153,7 @@ def test_signals_end_a_capture_as_the_user_does(number):
 
 
 def killed(path, frames=25):
-    """What a kill leaves: frames, the last of which were not flushed, with streams of every kind."""
+    """File after a kill: frames, the last of which were not flushed, with streams of every kind."""
     streams = {"imu/time": Stream((), "f8", "s", "", "imu/time"), "truth/pose": Stream((7,), "f8", "m", "")}
     with RecordingWriter(
         path,
@@ -173,7 +175,7 @@ def killed(path, frames=25):
 def test_recover(tmp_path):
     part = killed(tmp_path / "a.h5")
     done = CliRunner().invoke(app, ["recover", str(part)])
-    assert done.exit_code == 0 and "a.h5: 25 frames" in done.stdout and "a.h5.part: what wrote it ended" in done.stderr
+    assert done.exit_code == 0 and "a.h5: 25 frames" in done.stdout and "which was interrupted" in done.stderr
     assert os.listdir(tmp_path) == ["a.h5"]
     with Recording(tmp_path / "a.h5") as recording:
         assert np.array_equal(recording.adc(0, 99), ADC[:25]) and recording.cfg_text == "% mine"
@@ -189,9 +191,9 @@ def test_what_cannot_be_recovered(tmp_path):
         recover(tmp_path / "a.h5")
     part = killed(tmp_path / "b.h5")
     (tmp_path / "b.h5").write_bytes(b"")
-    with pytest.raises(InputError, match="b.h5: is there already"):
+    with pytest.raises(InputError, match="b.h5: already exists"):
         recover(part)
-    with pytest.raises(InputError, match="a.h5: is there already"):
+    with pytest.raises(InputError, match="a.h5: already exists"):
         recover(part, tmp_path / "a.h5")
     with RecordingWriter(tmp_path / "c.h5", SMALL) as writer:
         writer.append(ADC[:3], np.arange(3.0))
@@ -214,9 +216,9 @@ def test_what_was_captured_is_not_replaced_unasked(tmp_path):
     before = (tmp_path / "a.h5").read_bytes()
     left = killed(tmp_path / "b.h5")
     for path, hint in ((tmp_path / "a.h5", "expected another name"), (tmp_path / "b.h5", "radarize recover")):
-        with pytest.raises(InputError, match=f"{path.name}.*is there already.*{hint}"):
+        with pytest.raises(InputError, match=f"{path.name}.*already exists.*{hint}"):
             captured(path, Played(frames=4))
-        with pytest.raises(InputError, match="is there already"):  # by a simulation, say
+        with pytest.raises(InputError, match="already exists"):  # such as a simulation
             RecordingWriter(path, SMALL)
     assert (tmp_path / "a.h5").read_bytes() == before and left.exists()
     captured(tmp_path / "a.h5", Played(frames=4), overwrite=True)
@@ -245,7 +247,7 @@ def test_what_was_simulated_may_be_replaced(tmp_path):
 
 
 def test_a_live_pipeline_takes_no_more_frames_at_a_time_than_it_was_prepared_for(monkeypatch):
-    """What libraries keep for each number of frames is there before the first one comes."""
+    """Buffers that libraries cache per batch size exist before the first frame."""
     sizes, take, asked = [], live.Preprocessor.process, []
     monkeypatch.setattr(
         live.Preprocessor, "process", lambda self, adc, *more: (sizes.append(len(adc)), take(self, adc, *more))[1]

@@ -1,4 +1,4 @@
-"""The pipeline on a stream: the same result as from the file, shown in a real browser while it runs."""
+"""Live pipeline on a stream: the same result as from the file, shown in a real browser."""
 
 import json
 import threading
@@ -59,7 +59,7 @@ def walk(tmp_path_factory):
 
 
 class Kept(Live):
-    """A live pipeline whose results are kept."""
+    """Live pipeline that stores its results."""
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -74,7 +74,7 @@ def poses(results: list[Result]) -> np.ndarray:
 
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
-    """Of every frame, or of every second; all are recorded."""
+    """For every frame, or every second one; all are recorded."""
     inputs = Inputs(PRESETS["radarize"], every=every)
     with LivePage("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
         live = Kept(inputs, CLASSICAL, page)
@@ -97,7 +97,7 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
 
 
 def test_foxglove_gets_what_the_page_gets(walk):
-    """The protocol itself: tests/evaluation/test_foxglove.py."""
+    """Same content as on the page; the protocol is tested in tests/evaluation/test_foxglove.py."""
     sent = []
 
     class Server:
@@ -117,7 +117,7 @@ def test_foxglove_gets_what_the_page_gets(walk):
 
 
 def test_too_slow_means_dropped_frames_not_delay(walk):
-    """Ten times real time, and room for four frames: what is processed is whole, and the rest is counted."""
+    """Ten times real time, and space for four frames: processed frames are whole, dropped ones are counted."""
     with LivePage("127.0.0.1:0") as page, Replay(walk, speed=1e4, slots=4) as stream:
         live = Live(Inputs(PRESETS["radarize"]), CLASSICAL, page)
         while stream.counts.frames < FRAMES:
@@ -218,7 +218,7 @@ def test_a_recording_that_cannot_be_played(tmp_path):
 
 
 def test_the_map_of_an_hour_is_drawn_beside_the_frames(monkeypatch):
-    """7,000 nodes: the frame loop waits for none of them; of the next map only what is new is drawn."""
+    """7,000 nodes: the frame loop is not delayed, and the next map draws only new nodes."""
     monkeypatch.setattr("radarize.capture.live._PAUSE", 0.0)
     config, angles = Inputs(SMALL).configuration.slam, np.linspace(0, 200, 7000)
     ranges = np.full(len(BEARINGS), 2.0)

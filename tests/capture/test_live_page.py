@@ -1,4 +1,4 @@
-"""Who may look at the live page."""
+"""Access control of the live page."""
 
 import socket
 
@@ -9,7 +9,7 @@ from radarize.capture.page import LivePage
 
 
 def asked(page: LivePage, *headers: str, path: str = "/") -> str:
-    """The first line of the answer to a request with such headers."""
+    """First line of the answer to a request with given headers."""
     with connected(page) as client:
         client.sendall("\r\n".join([f"GET {path} HTTP/1.1", *headers, "", ""]).encode())
         return client.makefile().readline().strip()
@@ -47,7 +47,7 @@ def test_only_the_page_itself_asks(host, origin, answer):
             assert asked(page, *given, path=path).startswith(f"HTTP/1.0 {answer} ")
 
 
-def test_one_connection_too_many_is_told_so(monkeypatch):
+def test_one_connection_too_many_is_refused(monkeypatch):
     monkeypatch.setattr(module, "_CLIENTS", 2)
     with LivePage("127.0.0.1:0") as page:
         held = [connected(page) for _ in range(2)]

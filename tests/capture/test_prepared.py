@@ -1,4 +1,4 @@
-"""Once `live` is prepared, SLAM has nothing left to compile. In a process of its own: others have compiled before."""
+"""After preparation of `live`, SLAM compiles nothing. In a separate process, because other tests compile, too."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Frames between processes: all of them in order, or whole ones dropped and counted."""
+"""Frames between processes: all in order, or whole ones dropped and counted."""
 
 import multiprocessing
 import os

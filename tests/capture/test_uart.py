@@ -1,4 +1,4 @@
-"""The radar's command line, against the virtual one, and against ports that are not what they should be."""
+"""Radar's command line, against the virtual one, and against unsuitable ports."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ CONFIG = PRESETS["radarize"]
 
 
 class Radar:
-    """What the virtual command line acts on."""
+    """Radar controlled by the virtual command line."""
 
     def __init__(self):
         self.started = []
@@ -41,7 +41,7 @@ def terminal():
 
 @contextlib.contextmanager
 def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
-    """A port behind which `answer` replies to every line."""
+    """Port behind which `answer` replies to every line."""
     master, slave = os.openpty()
     closed = threading.Event()
     os.set_blocking(master, False)
@@ -114,7 +114,7 @@ def test_silence_is_explained():
 
 
 def test_calibration_data_may_be_unknown():
-    """Old firmware knows no calibData; everything else must be taken."""
+    """Old firmware rejects calibData as unknown; everything else must be accepted."""
 
     def old(line: bytes) -> bytes:
         known = b"Done" if not line.startswith(b"calibData") else b"'calibData' is not recognized as a CLI command"

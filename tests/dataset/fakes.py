@@ -1,4 +1,4 @@
-"""Tasks that make small recordings without simulating, and go wrong where asked to."""
+"""Fake tasks that make small recordings without simulation, and fail on request."""
 
 import os
 import signal
@@ -50,7 +50,7 @@ class FakeTask(Task):
 
 
 def fake(name: str, trouble: str = "", frames: int = 4) -> FakeTask:
-    """A task that takes no time."""
+    """Task that takes no time."""
     return FakeTask(
         name=name, building="A", floor=None, platform="cart", scene={}, duration=1.0, frames=frames,
         seed=sum(name.encode()), radar="radarize", frontend=None, settings="", sensors=(), storage="raw",
@@ -59,11 +59,11 @@ def fake(name: str, trouble: str = "", frames: int = 4) -> FakeTask:
 
 
 class FakeSpecification:
-    """A list of tasks in the place of a specification."""
+    """List of tasks in place of a specification."""
 
     def __init__(self, *tasks: Task):
         self.tasks = tasks
 
     def as_data(self) -> dict:
-        """Nothing worth reading."""
+        """Empty specification data."""
         return {"splits": {}}

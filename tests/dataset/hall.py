@@ -1,4 +1,4 @@
-"""A hall with somebody in it, a small radar, and data sets of walks through it."""
+"""A hall with a person in it, a small radar, and data sets of walks through it."""
 
 from pathlib import Path
 
@@ -26,12 +26,12 @@ WAY = [[1, 2.4], [5, 2.4]]
 
 
 def recordings(platform: str | list[str] = "cart", duration: float = 3.0, way: list = WAY) -> list[dict]:
-    """Of a specification: one walk along the hall for each platform."""
+    """Recordings of a specification: one walk along the hall for each platform."""
     return [{"building": "hall", "platform": platform, "count": 1, "duration": duration, "waypoints": way}]
 
 
 def write(folder: Path, **changes) -> Path:
-    """A specification of recordings in the hall, and the files that it names."""
+    """Write a specification of recordings in the hall, and its files."""
     (folder / "hall.yaml").write_text(HALL)
     (folder / "small.cfg").write_text(write_cfg(CONFIG))
     plain = {"name": "tiny", "seed": 1, "buildings": {"hall": "hall.yaml"}, "radar": "small.cfg", "randomise": {}}
@@ -41,5 +41,5 @@ def write(folder: Path, **changes) -> Path:
 
 
 def specification(folder: Path, **changes) -> Specification:
-    """The same, read."""
+    """Write the specification and read it."""
     return Specification.load(write(folder, **changes))

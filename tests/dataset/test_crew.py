@@ -1,4 +1,4 @@
-"""The run of a data set, whatever makes its recordings: progress, failures, killed workers, resuming, refusals."""
+"""Run of a data set with fake recordings: progress, failures, killed workers, resuming, refusals."""
 
 import os
 import shutil
@@ -25,7 +25,7 @@ def made(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    """Recordings that this process has made."""
+    """Recordings made in this process."""
     folder = tmp_path_factory.mktemp("undisturbed")
     for name in "abcd":
         fake(name).make(folder, lambda done, total: None)
@@ -35,7 +35,7 @@ def undisturbed(tmp_path_factory):
 def test_every_recording_is_made_once(undisturbed, tmp_path):
     seen, lines = [], []
     specification = FakeSpecification(*(fake(name) for name in "abcd"))
-    arguments = {"workers": 2, "progress": lambda *p: seen.append(p), "say": lines.append}
+    arguments = {"workers": 2, "progress": lambda *p: seen.append(p), "log": lines.append}
     outcome = make(specification, tmp_path, **arguments)
     assert sorted(outcome.made) == ["a", "b", "c", "d"] and not outcome.kept and not outcome.failed
     assert seen[0] == (0, 16) and seen[-1] == (16, 16) and seen == sorted(seen)
@@ -46,20 +46,20 @@ def test_every_recording_is_made_once(undisturbed, tmp_path):
 
 
 def test_failures_do_not_stop_the_others(undisturbed, tmp_path):
-    """A bad tour, a bug, and a process that is killed each time: named, and nothing half-written stays."""
+    """A bad tour, a bug, and a process that is killed every time: all are reported, and no partial recording stays."""
     tasks = fake("a", "fails"), fake("b", "breaks"), fake("x", "killed"), fake("c"), fake("d")
     lines = []
-    outcome = make(FakeSpecification(*tasks), tmp_path, workers=1, say=lines.append)
+    outcome = make(FakeSpecification(*tasks), tmp_path, workers=1, log=lines.append)
     assert sorted(outcome.made) == ["c", "d"]
     assert outcome.failed["a"] == "a: no room to move"
     assert outcome.failed["b"] == "b: internal error, ZeroDivisionError: odd"
-    assert outcome.failed["x"].startswith("x: its process was killed, twice")
+    assert outcome.failed["x"].startswith("x: its process was killed twice")
     assert "failed: a: no room to move" in lines
     assert made(tmp_path) == {name: undisturbed[name] for name in ("c.h5", "d.h5")}
 
 
 def test_a_killed_worker_is_replaced_and_its_task_begun_again(tmp_path):
-    outcome = make(FakeSpecification(fake("a", "killed once"), fake("b")), tmp_path, workers=1, say=lambda line: None)
+    outcome = make(FakeSpecification(fake("a", "killed once"), fake("b")), tmp_path, workers=1, log=lambda line: None)
     assert sorted(outcome.made) == ["a", "b"] and not outcome.failed
     with Recording(tmp_path / "a.h5") as recording:
         assert len(recording) == 4
@@ -69,7 +69,7 @@ def test_half_written_recordings_are_redone(undisturbed, tmp_path):
     specification = FakeSpecification(*(fake(name) for name in "abcd"))
     for name, cut in (("a.h5.part", 5000), ("b.h5", 5000), ("c.h5", None)):  # half-written, cut short, whole
         (tmp_path / name).write_bytes(undisturbed[name[:4]][:cut])
-    outcome = make(specification, tmp_path, workers=1, say=lambda line: None)
+    outcome = make(specification, tmp_path, workers=1, log=lambda line: None)
     assert outcome.kept == ["c"] and sorted(outcome.made) == ["a", "b", "d"]
     assert made(tmp_path) == undisturbed
 
@@ -79,31 +79,31 @@ def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
         fake(name).make(tmp_path, lambda done, total: None)
     before = made(tmp_path)
     longer = FakeSpecification(fake("a"), fake("b", frames=5))
-    with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings anew"):
+    with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings again"):
         make(longer, tmp_path)
     assert made(tmp_path) == before
-    outcome = make(longer, tmp_path, workers=1, replace=True, say=lambda line: None)
+    outcome = make(longer, tmp_path, workers=1, replace=True, log=lambda line: None)
     assert outcome.kept == ["a"] and outcome.made == ["b"]
 
 
 def test_a_full_disk_ends_the_run(small_disk):
-    """Whatever the system's language, for the worker's error carries what it is; a room without space does not."""
+    """In any system language, because the worker's error has a code; a room without space is a different error."""
     tasks = fake("a", "small rooms"), fake("b"), fake("c", "full disk"), fake("d")
     with pytest.raises(DiskFull, match="no space left on the device; 1 of 4 recordings are finished"):
-        make(FakeSpecification(*tasks), small_disk, workers=1, say=lambda line: None)
+        make(FakeSpecification(*tasks), small_disk, workers=1, log=lambda line: None)
 
 
 def test_recordings_of_other_physics_are_named_and_made_anew(tmp_path, monkeypatch):
     task = FakeSpecification(fake("a"))
-    make(task, tmp_path, workers=1, say=lambda line: None)
+    make(task, tmp_path, workers=1, log=lambda line: None)
     monkeypatch.setattr(physics, "digest", lambda: "other")
     with pytest.raises(InputError, match=r'a has physics "[0-9a-f]{16}", now "other"; --replace makes such recordings'):
         make(task, tmp_path)
 
 
 def test_physics_are_the_sources_wherever_they_are(tmp_path):
-    """Installed, without what was compiled, they have the same digest; with a changed line of the propagation another,
-    of a report not."""
+    """The digest is the same after installation, without compiled files; a changed line of propagation changes it, one
+    of a report does not."""
     for package in ("radarsim", "radarize"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
     shutil.copytree(ROOT / "scenes", tmp_path / "radarsim" / "scenes")
@@ -123,8 +123,8 @@ def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(run, "perform", interrupted)
-    with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command goes on"):
-        make(FakeSpecification(fake("a"), fake("b")), tmp_path, say=lambda line: None)
+    with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command continues"):
+        make(FakeSpecification(fake("a"), fake("b")), tmp_path, log=lambda line: None)
     assert list(made(tmp_path)) == ["b.h5.part"]  # to go on from
 
 
@@ -166,5 +166,5 @@ def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
     while any(Path(f"/proc/{pid}").exists() for pid in children.stdout.split()):
         assert time.monotonic() < waited, "a worker outlives its parent"
         time.sleep(0.02)
-    outcome = make(FakeSpecification(fake("a")), folder, workers=1, say=lambda line: None)
+    outcome = make(FakeSpecification(fake("a")), folder, workers=1, log=lambda line: None)
     assert outcome.kept == ["a"]

@@ -1,4 +1,4 @@
-"""Real recordings of a data set: what they hold, what their variants have in common, what is refused."""
+"""Simulated recordings of a data set: contents, common properties of variants, refusals."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_a_recording_holds_what_was_asked_for(tmp_path):
 
 
 def test_variants_of_a_recording_share_its_walk(tmp_path):
-    """The crate of level 1 would push a walk of its own aside, and heights are on one and the same."""
+    """The crate of level 1 would change the plan of a walk, and heights are the same for all variants."""
     slow = {"radar": {"frame_period": 0.25}}
     variants = {
         "mild": slow,

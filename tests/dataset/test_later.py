@@ -1,4 +1,4 @@
-"""Sensors that a data set's specification asks for later."""
+"""Sensors added to a data set's specification later."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tests.dataset import hall
 
 
 def test_sensors_beside_the_radar_are_added_to_what_is_there(tmp_path):
-    """With the values that they would have had from the start; the radar is not simulated anew."""
+    """They have the values that they would have had from the start; the radar is not simulated again."""
     (tmp_path / "at_once").mkdir()
     fixed = {"storage": "heatmaps", "recordings": hall.recordings(duration=1.0)}
     bare, both, other = (

@@ -1,4 +1,4 @@
-"""What differs at random between recordings: distributions, what hangs on them, and what is refused."""
+"""Domain randomisation of recordings: distributions, dependences, and refusals."""
 
 import json
 from pathlib import Path
@@ -101,7 +101,7 @@ def test_the_default_is_within_what_platforms_and_rooms_have():
 
 
 def test_data_sets_draw_by_default(tmp_path):
-    """All that is not given; a recording's draws stay the same whatever else the data set holds."""
+    """All fields that are not given are drawn; a recording's draws do not depend on other recordings."""
     tasks = {task.name: task for task in load(tmp_path).tasks}
     scene = {"clutter", "unevenness", "furniture", "materials"}
     assert all(task.randomised.keys() == scene | {"height", "pitch", "roll"} for task in tasks.values())
@@ -125,7 +125,7 @@ def test_nothing_is_drawn_on_request(tmp_path):
 
 
 def test_data_sets_of_the_project():
-    """Those that train and those that judge draw; the stress test, whose levels differ alone, does not."""
+    """Training and evaluation data sets are randomised; the stress test, in which only levels differ, is not."""
     for file in (shipped() / "datasets").glob("*.yaml"):
         tasks = Specification.load(file.stem).tasks
         assert any(task.randomised for task in tasks) == (file.stem != "stress")
@@ -140,9 +140,9 @@ def test_data_sets_of_the_project():
 
 
 def test_what_was_drawn_arrives(tmp_path):
-    """In the scene, in the sensor's true poses, in the recording and in the index."""
+    """Drawn values are in the scene, in the sensor's true poses, in the recording and in the index."""
     wanted = hall.specification(tmp_path, randomise=SOME, recordings=hall.recordings(["cart", "robot"], duration=1.5))
-    make(wanted, tmp_path / "out", workers=2, say=lambda _: None)
+    make(wanted, tmp_path / "out", workers=2, log=lambda _: None)
     index = json.loads((tmp_path / "out" / INDEX).read_text())
     assert index["specification"]["randomise"]["clutter"] == SOME["clutter"]
     for task in wanted.tasks:
@@ -166,11 +166,11 @@ def test_what_was_drawn_arrives(tmp_path):
 
 
 def test_same_bytes_whoever_makes_it(tmp_path):
-    """Processes, in any order, beside other recordings or alone."""
+    """Same bytes for any number of processes, any order, and with or without other recordings."""
     both = hall.recordings(["cart", "robot"], duration=1)
     for folder, groups, workers in (("a", both, 2), ("b", [both[0] | {"platform": ["robot"]}], 1)):
         make(hall.specification(tmp_path, randomise=SOME, recordings=groups), tmp_path / folder, workers=workers,
-             say=lambda _: None)  # fmt: skip
+             log=lambda _: None)  # fmt: skip
     name = "hall_robot_00.h5"
     assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
@@ -180,13 +180,13 @@ def test_the_plan_is_printed(tmp_path, capsys, monkeypatch):
     path = hall.write(tmp_path, randomise=SOME, recordings=hall.recordings(["cart", "robot"]))
     with pytest.raises(SystemExit) as ended:
         run(app, "radarsim", ["dataset", str(path), "--plan"])
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     assert ended.value.code == 0 and sorted(p.name for p in tmp_path.iterdir()) == [
         "hall.yaml",
         "small.cfg",
         "tiny.yaml",
     ]
-    lines = [" ".join(line.split()) for line in said.splitlines()]
+    lines = [" ".join(line.split()) for line in printed.splitlines()]
     for line in (
         "clutter all uniform 0.8, 1.2",
         "pitch all normal 4, 1",

@@ -1,4 +1,4 @@
-"""Specifications: what they stand for, their splits, and one clear sentence for what is wrong."""
+"""Specifications: expansion, splits, and error messages of one sentence."""
 
 from collections import Counter
 from pathlib import Path
@@ -51,7 +51,7 @@ def test_recordings_of_a_specification(tmp_path):
 
 
 def test_buildings_have_clutter_and_unevenness(tmp_path):
-    """Clutter, unevenness and other radars stand beside the building in its scene, and change neither seed nor walk."""
+    """Clutter, unevenness and other radars are top-level keys of the scene, and change neither seed nor walk."""
     lived = load(tmp_path, buildings=PLAIN["buildings"] | {"old": {"kind": "B", "seed": 3, "clutter": 2}})
     assert lived.tasks[1].scene == {"building": {"kind": "B", "seed": 3, "floor": 2}, "clutter": 2}
     assert [task.seed for task in lived.tasks] == [task.seed for task in load(tmp_path).tasks]
@@ -71,8 +71,8 @@ def test_seeds_depend_on_nothing_but_seed_and_name(tmp_path):
     assert not set(seeds.values()) & {task.seed for task in load(tmp_path, seed=2).tasks}
 
 
-def test_parameters_tell_recordings_apart(tmp_path):
-    """Whatever decides the bytes changes the identity, and a moved file does not."""
+def test_parameters_distinguish_recordings(tmp_path):
+    """All parameters that determine the bytes change the identity; moving a file does not."""
     plain = load(tmp_path).tasks[3].identity
     scene = tmp_path / "mine.yaml"
     changes = [{"seed": 2}, {"radar": "two-tx"}, {"sensors": ["imu"]}, {"storage": "heatmaps"}]
@@ -89,7 +89,7 @@ def test_parameters_tell_recordings_apart(tmp_path):
 
 
 def test_a_changed_mesh_is_another_recording(tmp_path):
-    """Of any level of the scene; where it lies and what else lies there do not matter."""
+    """A mesh at any level of the scene changes the identity; its folder and other files there do not."""
     mine = "objects: [{name: a, shape: mesh, file: a.ply, material: wood}]\n"
     (tmp_path / "mine.yaml").write_text(
         mine + "levels: [{objects: [{name: b, shape: mesh, file: b.ply, material: wood}]}]"
@@ -105,7 +105,7 @@ def test_a_changed_mesh_is_another_recording(tmp_path):
 
 
 def test_variants_change_parts_of_parts(tmp_path):
-    """A calibrated board keeps its channels when another of its leakage's fields changes."""
+    """A calibrated board keeps its channels when another field of its leakage changes."""
     channels = tuple(Channel(gain_db=-40.0 - k, phase_deg=10.0 * k) for k in range(12))
     FrontEndConfig.of(CONFIG.board, leakage=Leakage(channels=channels, delay=0.3e-9)).save(tmp_path / "board.yaml")
     variants = {"far": {"frontend": {"leakage": {"delay": 0.9e-9}, "noise_figure_db": {30: 20.0}}}, "none": {}}
@@ -117,7 +117,7 @@ def test_variants_change_parts_of_parts(tmp_path):
 
 
 def test_the_papers_data_set():
-    """Counts, platforms and splits of pipeline.md, section 7."""
+    """Counts, platforms and splits of the paper's section 7."""
     found = Specification.load("radarize146")
     counts = Counter((task.platform, task.building) for task in found.tasks)
     for platform, table in (("handheld", (15, 9, 12, 11)), ("cart", (10, 11, 15, 9)), ("robot", (9, 15, 15, 15))):
@@ -177,13 +177,13 @@ def test_recordings_may_name_their_variants_and_have_people(tmp_path):
 
 
 def test_a_plain_recording_is_the_one_it_always_was(tmp_path):
-    """Fields that data sets did not have before count as absent, so that finished recordings stay finished."""
+    """Fields that older data sets did not have count as absent, so that finished recordings stay valid."""
     parameters = load(tmp_path).tasks[0].parameters
     assert all(parameters[name] is None for name in ("waypoints", "variant", "attributes"))
 
 
 def test_files_of_scenes_are_read_once(tmp_path, monkeypatch):
-    """And not for each of the 20,000 recordings that there may be."""
+    """Files are read once, not for each of up to 20,000 recordings."""
     asked = []
     for module in (specification, description):
         monkeypatch.setattr(module, "read_yaml", lambda path: asked.append(path.name) or read_yaml(path))
@@ -207,7 +207,7 @@ def test_levels_are_scenes_of_their_own(tmp_path):
 
 
 def test_the_stress_test():
-    """Seven places at four levels; all that differs between them is the level."""
+    """Seven places at four levels; the recordings of a place differ only in the level."""
     tasks = Specification.load("stress").tasks
     assert Counter(task.attributes["severity"] for task in tasks) == dict.fromkeys(range(4), 7)
     assert len({task.attributes["stress"] for task in tasks}) == 7
@@ -217,7 +217,7 @@ def test_the_stress_test():
 
 
 def test_ablations_change_what_they_are_called_after():
-    """The right way, by closed forms of the radar."""
+    """The values have the expected effect, by closed forms of the radar."""
     found: dict[str, list] = {}
     for file in (shipped() / "datasets" / "ablation").glob("*.yaml"):
         tasks = Specification.load(f"ablation/{file.stem}").tasks

@@ -1,4 +1,4 @@
-"""Files that README and docs take as given: a capture, a map, a mesh, somebody's scans."""
+"""Files that README and docs assume: a capture, a map, a mesh, scans of another sensor."""
 
 import gzip
 import os
@@ -36,8 +36,8 @@ SECONDS, PLACE = 1.5 if ALL else 0.8, "stress/corner"  # RadarHD, of another pag
 
 
 def specification(name: str, path: Path) -> None:
-    """A data set of the project, but short."""
-    assert name in DATASETS, f"data set {name} is none of DATASETS, which says how little of each is made"
+    """A data set of the project, shortened."""
+    assert name in DATASETS, f"data set {name} is none of DATASETS, which has the shortened size of each"
     folder = shipped() / "datasets"
     data, kept = yaml.safe_load((folder / f"{name}.yaml").read_text()), DATASETS[name]
     groups = {group["building"]: group for group in reversed(data["recordings"])}
@@ -62,7 +62,7 @@ def specification(name: str, path: Path) -> None:
 
 
 def _plan(path: Path) -> None:
-    """A room of 8 x 6 m as map_server has it, with its picture beside."""
+    """A map of a room of 8 x 6 m for map_server, with its image."""
     pixels = np.full((140, 180), 205, np.uint8)
     pixels[10:130, 10:170] = 254
     pixels[[10, 129], 10:170] = pixels[10:130, [10]] = pixels[10:130, [169]] = 0
@@ -72,7 +72,7 @@ def _plan(path: Path) -> None:
 
 
 def _square(bearings: np.ndarray, x: float) -> np.ndarray:
-    """Ranges from (x, 0) to the walls of a room of 6 x 6 m about the origin."""
+    """Ranges from (x, 0) to the walls of a room of 6 x 6 m around the origin."""
     with np.errstate(divide="ignore"):
         across = np.where(np.cos(bearings) > 0, 3 - x, 3 + x) / np.abs(np.cos(bearings))
         return np.minimum(across, 3 / np.abs(np.sin(bearings)))
@@ -112,7 +112,7 @@ def _capture(path: Path) -> None:
 
 
 def _cube(path: Path) -> None:
-    """Loops, two transmitters by four receivers, samples."""
+    """Samples of two transmitters and four receivers (loop, channel, sample)."""
     noise = np.random.default_rng(0).normal(0, 30, (2, 32, 8, 64))
     np.save(path, (noise[0] + 1j * noise[1]).astype(np.complex64))
 
@@ -134,7 +134,7 @@ def _studio(path: Path) -> None:
 
 
 def _clone(path: Path) -> None:
-    """A walk of RadarHD's repository, of a wall ahead."""
+    """A walk in the layout of RadarHD's repository, with a wall ahead."""
     for kind, columns, name in (("radar", 64, "R"), ("lidar", 512, "L")):
         (path / "test" / kind).mkdir(parents=True)
         picture = np.zeros((256, columns), np.uint8)

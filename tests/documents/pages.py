@@ -1,4 +1,4 @@
-"""What README and docs tell a reader to type."""
+"""Commands and scripts that README and docs show for typing."""
 
 import re
 import subprocess

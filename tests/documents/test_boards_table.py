@@ -1,4 +1,4 @@
-"""The table of boards in docs/howto/board.md is what the boards' files say."""
+"""The table of boards in docs/howto/board.md has the content of the board files."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 """Every command of README and docs, in order, as a reader types them.
 
-What is typed is what the pages say (`pages.py`), but for `TYPED_INSTEAD`: everything shorter, and hardware virtual.
+Commands are those of the pages (`pages.py`), except for `TYPED_INSTEAD`: all shorter, and on virtual hardware.
 The other pages follow README, with what it left behind. A command that is new on a page runs here by itself, or fails.
 The suite types README, with the kernels that the checkout has compiled: in a fresh one, those of set-up. The other
 pages take minutes more: `make documents` types them, too, all of it where no kernel has been compiled yet.
@@ -93,7 +93,7 @@ def reason_not_to(command: Command) -> str | None:
 
 
 class Reader:
-    """Somebody who types commands in a folder.
+    """A reader who types commands in a folder.
 
     Args:
         folder: where.
@@ -113,7 +113,7 @@ class Reader:
         self.took: dict[str, float] = {}
 
     def type(self, command: Command) -> str | None:
-        """Run a command; what it said if it failed."""
+        """Run a command; return its output if it failed, else None."""
         before = self.log.stat().st_size if self.log.exists() else 0
         if command.script:
             (self.folder / "script.py").write_text(command.text)
@@ -123,7 +123,7 @@ class Reader:
             line = typed(command.text).replace("{tty}", str(self.folder / "tty")).replace("{ports}", ports)
             words = shlex.split(line)
             if words[0] not in ("radarize", "radarsim", "torchrun"):
-                return f"{line}: nobody knows how to run it; {Path(__file__).name} has tables for that"
+                return f"{line}: no rule to run it; {Path(__file__).name} has tables for that"
             if command.mentioned:
                 words = [*shlex.split(command.text), "--help"]
             elif words[1] == "emulate":
@@ -142,8 +142,8 @@ class Reader:
         missing = [name for name in outputs if not self.written(name, begun)]
         if code == 0 and not missing:
             return None
-        said = self.log.read_bytes()[before:].decode(errors="replace")[-1500:]
-        return f"{' '.join(words)}\nexit code {code}, not written: {missing}\n{said}"
+        output = self.log.read_bytes()[before:].decode(errors="replace")[-1500:]
+        return f"{' '.join(words)}\nexit code {code}, not written: {missing}\n{output}"
 
     def written(self, name: str, since: float) -> bool:
         """Whether a file or folder of that name, whatever its ending, is of this moment or later."""
@@ -194,7 +194,7 @@ def read(page: str, folder: Path, caches: Path | None) -> list[str]:
 
 @pytest.fixture(scope="module")
 def failures(tmp_path_factory) -> dict[str, list[str]]:
-    """By page typed, begun in an empty folder; of all pages with no compiled kernel."""
+    """Commands of each page, in an empty folder; with DOCUMENTS set, of all pages and without compiled kernels."""
     folder = tmp_path_factory.mktemp("documents")
     caches, first = folder / "caches" if ALL else None, folder / "first"
     first.mkdir()
@@ -226,10 +226,10 @@ def test_no_page_is_forgotten_and_no_exception_outlives_its_command():
         assert any(text.startswith(f"radarsim dataset {name} ") for text in everything), f"no page makes {name}"
 
 
-def test_a_command_that_nobody_knows_fails(tmp_path):
+def test_an_unknown_command_fails(tmp_path):
     reader = Reader(tmp_path, None)
     try:
-        assert "nobody knows how" in reader.type(Command("ros2 run radar"))
+        assert "no rule to run it" in reader.type(Command("ros2 run radar"))
         assert "exit code 2" in reader.type(Command("radarize info missing.h5"))
         assert "exit code 2" in reader.type(Command("radarize frobnicate"))
     finally:

@@ -1,4 +1,4 @@
-"""Links between pages lead somewhere, and the site has them all."""
+"""Links between pages have targets, and the site includes all pages."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The page of trials names tests that are there."""
+"""The page of trials names existing tests."""
 
 import re
 from pathlib import Path

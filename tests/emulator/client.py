@@ -1,4 +1,4 @@
-"""A client of the virtual radar that shares nothing with ours but the words of the protocol."""
+"""Independent client of the virtual radar, which shares only the protocol's constants with the project."""
 
 import select
 import socket
@@ -19,7 +19,7 @@ SMALL = CONFIG.model_copy(update={"loops": 4, "samples": 32, "frame_period": 20e
 
 
 class Client:
-    """Any capture software: a serial port, and two sockets as a DCA1000 wants them."""
+    """Minimal capture software: a serial port, and two sockets at the DCA1000's addresses."""
 
     def __init__(self, port: str, where: NetworkAddresses):
         self.serial = serial.Serial(port, 115200, timeout=150)
@@ -38,13 +38,13 @@ class Client:
         self.commands.close()
         self.data.close()
 
-    def say(self, line: str, ending: str = "\n") -> str:
-        """What comes back for a line, up to the prompt."""
+    def command(self, line: str, ending: str = "\n") -> str:
+        """Send a line and return the answer up to the prompt."""
         self.serial.write((line + ending).encode())
         return self.serial.read_until(PROMPT.encode()).decode()
 
     def configure(self, config: RadarConfig) -> list[str]:
-        return [self.say(line) for line in write_cfg(config).splitlines()]
+        return [self.command(line) for line in write_cfg(config).splitlines()]
 
     def ask(self, command: Opcode, body: bytes = b"") -> Reply:
         self.commands.sendto(Request(command, body).encode(), self.board)
@@ -61,7 +61,7 @@ class Client:
             assert self.ask(command, body) == Reply(command, 0)
 
     def packets(self, silence: float = 0.5) -> list[bytes]:
-        """Data packets until none comes for so long."""
+        """Receive data packets until none arrives within a timeout."""
         found = []
         while select.select([self.data], [], [], silence)[0]:
             found.append(self.data.recv(2048))
@@ -70,7 +70,7 @@ class Client:
 
 @contextmanager
 def attached(source: object, **options: object) -> Iterator[tuple[Emulator, Client, list[str]]]:
-    """An emulator, a client of it, and what it tells its user."""
-    said: list[str] = []
-    with emulated(source, say=said.append, **options) as (emulator, where), Client(emulator.port, where) as client:
-        yield emulator, client, said
+    """An emulator, a client of it, and the lines that it logs."""
+    lines: list[str] = []
+    with emulated(source, log=lines.append, **options) as (emulator, where), Client(emulator.port, where) as client:
+        yield emulator, client, lines

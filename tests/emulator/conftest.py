@@ -9,7 +9,7 @@ from tests.virtual import record
 
 @pytest.fixture
 def playing(tmp_path) -> Iterator[tuple[Client, np.ndarray, list[str]]]:
-    """A small recording, played."""
+    """Emulator that plays a small recording."""
     adc = record(tmp_path / "small.h5", SMALL, 12)
-    with attached(tmp_path / "small.h5") as (_, client, said):
-        yield client, adc, said
+    with attached(tmp_path / "small.h5") as (_, client, lines):
+        yield client, adc, lines

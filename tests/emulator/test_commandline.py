@@ -1,4 +1,4 @@
-"""The firmware's words: what is right, what is refused and when."""
+"""Firmware command line: accepted and refused commands, and their messages."""
 
 import re
 
@@ -29,7 +29,7 @@ class FakeRadar:
 
 
 def configured(radar: FakeRadar, **replaced: str) -> CommandLine:
-    """A command line that has had the preset's commands, some of them replaced."""
+    """Command line that has received the preset's commands, some of them replaced."""
     line = CommandLine(radar)
     for command in LINES:
         answer = line.execute(replaced.get(command.split()[0], command))
@@ -128,7 +128,7 @@ def test_antennas_cannot_change_without_a_reboot():
 
 
 @pytest.mark.parametrize(
-    "command, says",
+    "command, message",
     [
         ("profileCfg 0 77 122 7 50 0 0 120 1 96 2285 0 0 30", "sweep"),
         ("profileCfg 0 77 122 7 50 0 0 80 1 96 500 0 0 30", "ADC window"),
@@ -139,10 +139,10 @@ def test_antennas_cannot_change_without_a_reboot():
         ("frameCfg 0 2 32 many 33.333 1 0", "numFrames is many, expected 0 (without end) to 65535"),
     ],
 )
-def test_limits_are_named(command, says):
+def test_limits_are_named(command, message):
     radar = FakeRadar()
     answer = configured(radar, **{command.split()[0]: command}).execute("sensorStart")
-    assert "Error: mmWave Config failed: " in answer and answer.endswith("Error -1\n") and says in answer
+    assert "Error: mmWave Config failed: " in answer and answer.endswith("Error -1\n") and message in answer
     assert not radar.started
 
 

@@ -1,4 +1,4 @@
-"""`radarsim emulate` in a process: a client that knows nothing of this project, our own, and what users mistype."""
+"""`radarsim emulate` in a process: with a foreign client, with `radarize capture`, and with wrong arguments."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ from tests.virtual import BOARD, COMPUTER, CONFIG, emulator, record
 
 
 def test_xwr_captures_what_was_recorded(tmp_path):
-    """The client `xwr` (PyPI), from the command line's emulator: configures, captures, gets the samples."""
+    """The client `xwr` (PyPI) configures the emulator of the command line, captures, and gets the recorded samples."""
     from xwr import DCAConfig, XWRConfig, XWRSystem
 
     adc = record(tmp_path / "r.h5", CONFIG, 25)
@@ -32,7 +32,7 @@ def test_xwr_captures_what_was_recorded(tmp_path):
         system = XWRSystem(radar=radar, capture=capture, strict=True)
         frames = list(system.stream())
         system.stop()
-    assert "25 frames sent" in running.said
+    assert "25 frames sent" in running.output
     # The end of the 25th frame comes 2 s late, after xwr has given up.
     assert len(frames) == 24 and all(frame.complete for frame in frames)
     received = np.stack([np.frombuffer(frame.data, "<i2") for frame in frames]).reshape(24, *radar.raw_shape)
@@ -42,7 +42,7 @@ def test_xwr_captures_what_was_recorded(tmp_path):
 
 
 def test_our_own_capture_loses_nothing(tmp_path):
-    """The preset `radarize`, 30 frames/s for two seconds, both command lines in processes of their own."""
+    """The preset `radarize` at 30 frames/s for two seconds, with both command lines in separate processes."""
     preset = PRESETS["radarize"]
     adc = record(tmp_path / "r.h5", preset, 30)
     with emulator(tmp_path / "r.h5", tmp_path, "--loop") as running:
@@ -66,7 +66,7 @@ def test_our_own_capture_loses_nothing(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "arguments, says",
+    "arguments, message",
     [
         (["nowhere.h5"], "nowhere.h5: no such file"),
         (["nowhere"], "no scene 'nowhere'"),
@@ -74,10 +74,10 @@ def test_our_own_capture_loses_nothing(tmp_path):
         (["REC", "--loss", "2"], "loss"),
     ],
 )
-def test_the_command_line_says_what_is_wrong(tmp_path, capsys, arguments, says):
+def test_the_command_line_reports_what_is_wrong(tmp_path, capsys, arguments, message):
     record(tmp_path / "r.h5", SMALL, 1)
     arguments = [str(tmp_path / "r.h5") if argument == "REC" else argument for argument in arguments]
     with pytest.raises(SystemExit) as exit_:
         run(app, "radarsim", ["emulate", *arguments])
-    said = capsys.readouterr().err
-    assert exit_.value.code == 2 and says in said and said.count("\n") == 1, said
+    printed = capsys.readouterr().err
+    assert exit_.value.code == 2 and message in printed and printed.count("\n") == 1, printed

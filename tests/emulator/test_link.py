@@ -1,4 +1,4 @@
-"""The board's packets and their times, against the standard and a real capture; what a network does to them."""
+"""Packets of the emulated board and their times, against the standard and a real capture; network faults."""
 
 from collections import Counter
 
@@ -19,7 +19,7 @@ from tests.virtual import CONFIG
 
 
 class Wire:
-    """A clock that moves when somebody sleeps, and what was sent when."""
+    """Fake clock that advances in sleep, and a log of what was sent when."""
 
     def __init__(self, disturbance: Disturbance | None = None):
         self.now = 0.0
@@ -42,7 +42,7 @@ class Wire:
 
 
 def test_a_real_capture_comes_out_as_it_was(recordings):
-    """16 chirps of 1024 bytes: the same packets at the same times, the last one 2 s late, then the same status."""
+    """16 chirps of 1024 bytes: the same packets at the same times, the last one 2 s late, and the same status."""
     real = [p for p in captured(recordings / "iwr1843-pcap/test_one_frame.pcap") if p[1] == 4098]
     stream = b"".join(Packet.decode(payload).payload for _, _, payload in real)
     wire = Wire()
@@ -89,7 +89,7 @@ def test_packets_disregard_frames_and_count_from_the_start():
 
 
 def test_a_busy_machine_delays_packets_and_they_catch_up():
-    """Held up for 100 ms: no burst beyond what a small buffer takes, and on time again after 100 / (4 - 1) ms."""
+    """After 100 ms of delay: no burst beyond a small buffer, and on time again after 100 / (4 - 1) ms."""
     wire = Wire()
     wire.link.start()
     for number in range(1, 501):
@@ -162,7 +162,7 @@ def test_a_share_outside_0_to_1_is_refused():
 
 
 def test_frames_come_whole_through_a_bad_network():
-    """10,000 packets: each sample in its place or lost, and the lost ones marked."""
+    """10,000 packets: each sample is in its place or lost, and the lost ones are marked."""
     config = CONFIG
     frames = np.random.default_rng(3).integers(-(2**15), 2**15, (75, *config.frame_shape), dtype=np.int16)
     network = Disturbance(0.01, 0.01, 0.02, 0.005, np.random.default_rng(4))

@@ -1,4 +1,4 @@
-"""The virtual DCA1000's answers to requests from outside."""
+"""Replies of the virtual DCA1000 to requests."""
 
 import struct
 
@@ -23,7 +23,7 @@ def test_replies_are_those_of_a_real_board(playing, recordings):
 
 
 @pytest.mark.parametrize(
-    "command, body, says",
+    "command, body, message",
     [
         (Opcode.CONFIGURE, bytes([1, 1, 1, 2, 3, 30]), "expected 01 02 01 02 03 1e"),
         (Opcode.PACKETS, packet_settings()[:4], "packet settings of 4 bytes"),
@@ -34,10 +34,10 @@ def test_replies_are_those_of_a_real_board(playing, recordings):
         (99, b"", "request 99 fails"),
     ],
 )
-def test_requests_that_fail(playing, command, body, says):
-    client, _, said = playing
+def test_requests_that_fail(playing, command, body, message):
+    client, _, lines = playing
     assert client.ask(command, body) == Reply(command, 1)
-    assert says in said[-1]
+    assert message in lines[-1]
 
 
 @pytest.mark.parametrize(
@@ -53,9 +53,9 @@ def test_packet_sizes_of_other_programs(playing, size, ticks, expected):
 
 
 def test_damaged_requests_get_no_reply(playing):
-    client, _, said = playing
+    client, _, lines = playing
     good = Request(Opcode.ALIVE).encode()
     for damaged in (b"", good[:-1], b"\0" + good[1:], good[:4] + b"\1" + good[5:], b"x" * 2000):
         client.commands.sendto(damaged, client.board)
     assert client.ask(Opcode.ALIVE) == Reply(Opcode.ALIVE, 0)
-    assert sum("no reply" in line for line in said) == 5
+    assert sum("no reply" in line for line in lines) == 5

@@ -1,4 +1,4 @@
-"""The virtual radar's samples: each of them, when it is due, as the configuration says."""
+"""Samples of the virtual radar: values, timing, and configuration."""
 
 import errno
 import select
@@ -25,8 +25,8 @@ from tests.virtual import CONFIG, record
 
 
 def test_a_capture_by_hand(playing):
-    """Every byte; the last packet 2 s late, then the status: as the real board does it."""
-    client, adc, said = playing
+    """Every byte; the last packet is 2 s late, followed by the status, as on the real board."""
+    client, adc, lines = playing
     client.record()
     assert all("Error" not in answer for answer in client.configure(SMALL))
     received = [client.data.recv(2048) for _ in range(adc.size * 2 // 1456)]
@@ -35,11 +35,11 @@ def test_a_capture_by_hand(playing):
     assert time.monotonic() - before == pytest.approx(2, abs=0.3)
     assert Reply.decode(client.commands.recvfrom(2048)[0]) == Reply(Opcode.STATUS, Status.RECORD_COMPLETED)
     assert received == [packet.encode() for packet in packets(encode(adc, SMALL).tobytes())]
-    assert any("end of the source; 12 frames sent" in line for line in said)
+    assert any("end of the source; 12 frames sent" in line for line in lines)
     # Once more: the recording starts again, and so do the counts; this time the client stops.
-    client.say("sensorStop")
+    client.command("sensorStop")
     client.record()
-    client.say("sensorStart 0")
+    client.command("sensorStart 0")
     again = [client.data.recv(2048) for _ in range(10)]
     assert again == received[:10]
     assert client.ask(Opcode.STOP) == Reply(Opcode.STOP, 0)
@@ -59,7 +59,7 @@ def test_a_number_of_frames(playing):
     client, _, _ = playing
     client.record()
     for line in write_cfg(SMALL).splitlines():
-        client.say(line.replace(" 4 0 20 1 0", " 4 3 20 1 0"))
+        client.command(line.replace(" 4 0 20 1 0", " 4 3 20 1 0"))
     assert len(client.packets()) == 3 * SMALL.frame_bytes // 1456
 
 
@@ -77,7 +77,7 @@ def test_frames_keep_their_period_and_chirps_theirs(tmp_path):
     chirp = within // (CONFIG.frame_bytes // 96)
     due = frame * CONFIG.frame_period + (chirp + 1) * CONFIG.chirp_time
     behind = np.array(arrivals) - due
-    # A busy machine holds packets up, but none is early: the most punctual ones of each quarter tell the radar's clock,
+    # A busy machine holds packets up, but none is early: the earliest ones of each quarter give the radar's clock,
     quarters = behind[: len(behind) // 4 * 4].reshape(4, -1).min(axis=1)
     assert np.ptp(quarters) < 5e-3 + slipped
     # and those of each chirp its place in the burst: spread over the period, the last would be 31 ms late.
@@ -93,7 +93,7 @@ def test_sensor_stop_ends_with_a_whole_frame(tmp_path):
         client.configure(CONFIG)
         for _ in range(7 * CONFIG.frame_bytes // 1456):  # more frames than there are: it loops
             client.data.recv(2048)
-        assert client.say("sensorStop").endswith("sensorStop\nDone\n\r" + PROMPT)
+        assert client.command("sensorStop").endswith("sensorStop\nDone\n\r" + PROMPT)
         frames = emulator.frames
         client.ask(Opcode.STOP)
         time.sleep(0.1)
@@ -102,21 +102,21 @@ def test_sensor_stop_ends_with_a_whole_frame(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change, says",
+    "change, message",
     [
         ({"samples": 16}, "samples is 16, expected 32"),
         ({"tx_order": (0, 2, 1)}, r"tx_order is \(0, 2, 1\), expected \(0, 1, 2\)"),
         ({"frame_period": 25e-3}, "frame_period is 0.025, expected 0.02"),
     ],
 )
-def test_another_configuration_than_the_recordings_is_refused(playing, change, says):
-    client, _, said = playing
+def test_another_configuration_than_the_recordings_is_refused(playing, change, message):
+    client, _, lines = playing
     answer = client.configure(SMALL.model_copy(update=change))[-1]
-    with pytest.raises(AssertionError, match=says):
+    with pytest.raises(AssertionError, match=message):
         raise AssertionError(answer)
     assert answer.endswith("Error -1\n\r" + PROMPT)
-    with pytest.raises(AssertionError, match=f"refused: {says}"):
-        raise AssertionError(said[-1])
+    with pytest.raises(AssertionError, match=f"refused: {message}"):
+        raise AssertionError(lines[-1])
 
 
 def test_roundings_of_other_programs_are_taken(playing):
@@ -127,7 +127,7 @@ def test_roundings_of_other_programs_are_taken(playing):
 
 
 def test_2500_packets_through_a_bad_network(tmp_path):
-    """What arrives is what the seed says, in that order."""
+    """The packets that arrive, and their order, follow from the seed."""
     adc = record(tmp_path / "r.h5", CONFIG, 15)
     shares = (0.04, 0.04, 0.08, 0.008)
     network = Disturbance(*shares, rng=np.random.default_rng(7))
@@ -137,7 +137,7 @@ def test_2500_packets_through_a_bad_network(tmp_path):
         received = []
         while emulator.link.packets < 2_600:
             received += client.packets(silence=0.005)
-        client.say("sensorStop")
+        client.command("sensorStop")
         client.ask(Opcode.STOP)
         received += client.packets()
         count = emulator.frames
@@ -149,14 +149,14 @@ def test_2500_packets_through_a_bad_network(tmp_path):
     assert received == expected
 
 
-def test_a_source_that_is_too_slow_makes_frames_late_and_says_so(tmp_path):
+def test_a_source_that_is_too_slow_makes_frames_late_with_a_warning(tmp_path):
     adc = record(tmp_path / "r.h5", SMALL, 12)
-    with attached(Slow(tmp_path / "r.h5"), ahead=0) as (emulator, client, said):
+    with attached(Slow(tmp_path / "r.h5"), ahead=0) as (emulator, client, lines):
         client.record()
         client.configure(SMALL)
         received = b"".join(Packet.decode(data).payload for data in client.packets())
         assert emulator.frames == 12 and emulator.late >= 5 and emulator.lateness > 0.1
-    assert any("late: the source is too slow" in line for line in said)
+    assert any("late: the source is too slow" in line for line in lines)
     assert received == encode(adc, SMALL).tobytes()[: len(received)] and len(received) > 11 * SMALL.frame_bytes
 
 
@@ -175,11 +175,11 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
     with Recording(simulate(tmp_path / "hall.yaml", tmp_path / "hall.h5", **same, **way)) as recording:
         expected = encode(recording.adc(0, len(recording)), SMALL).tobytes()
     walk = Simulation(str(tmp_path / "hall.yaml"), Walk(**way), **same)
-    with attached(walk) as (emulator, client, said):
+    with attached(walk) as (emulator, client, lines):
         client.record()
         assert client.configure(SMALL)[-1].endswith("Done\n\r" + PROMPT)
         arrived = []
-        while not any("end of the source" in line for line in said):
+        while not any("end of the source" in line for line in lines):
             arrived += client.packets(silence=0.1)
             assert emulator.ready >= 0  # or the source's own error
         received = b"".join(Packet.decode(data).payload for data in arrived)
@@ -187,7 +187,7 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
 
 
 class Cut:
-    """A socket whose cable is unplugged."""
+    """A socket that fails as if its cable were unplugged."""
 
     def sendto(self, *_: object) -> None:
         raise OSError(errno.ENETUNREACH, "Network is unreachable")
@@ -195,7 +195,7 @@ class Cut:
 
 def test_an_unplugged_cable_loses_packets_and_stops_nothing(tmp_path, monkeypatch):
     record(tmp_path / "r.h5", SMALL, 5)
-    with attached(Playback(tmp_path / "r.h5", loop=True)) as (emulator, client, said):
+    with attached(Playback(tmp_path / "r.h5", loop=True)) as (emulator, client, lines):
         client.record()
         with monkeypatch.context() as cut:
             cut.setattr(emulator._sockets, "_out", Cut())
@@ -207,17 +207,17 @@ def test_an_unplugged_cable_loses_packets_and_stops_nothing(tmp_path, monkeypatc
             client.commands.sendto(Request(Opcode.ALIVE).encode(), client.board)  # whose reply is lost
             time.sleep(0.1)
         assert select.select([client.data], [], [], 5)[0]  # plugged in again
-        assert "Done" in client.say("sensorStop")
+        assert "Done" in client.command("sensorStop")
         assert client.ask(Opcode.ALIVE) == Reply(Opcode.ALIVE, 0)
-        assert sum("are lost (Network is unreachable)" in line for line in said) == 1
+        assert sum("are lost (Network is unreachable)" in line for line in lines) == 1
 
 
 def test_a_reset_while_it_starts_is_not_forgotten(tmp_path, monkeypatch):
     record(tmp_path / "r.h5", SMALL, 5)
-    with attached(Playback(tmp_path / "r.h5", loop=True)) as (emulator, _, said):
+    with attached(Playback(tmp_path / "r.h5", loop=True)) as (emulator, _, lines):
         prepare = emulator._prepare
         monkeypatch.setattr(emulator, "_prepare", lambda config: (prepare(config), emulator._reset()))
         with pytest.raises(InputError, match="reset while it started"):
             emulator.start(SMALL, 0)
         time.sleep(0.1)
-        assert emulator.frames == 0 and not any("started," in line for line in said)
+        assert emulator.frames == 0 and not any("started," in line for line in lines)

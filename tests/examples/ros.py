@@ -14,7 +14,7 @@ PACKAGES = ("builtin_interfaces", "geometry_msgs", "nav_msgs", "sensor_msgs", "t
 
 @cache
 def message_class(kind: str) -> type:
-    """A class as rclpy has it: made with any fields, the others blank; a field that it has not is refused."""
+    """A message class as in rclpy: constructed with any fields, the others zero; unknown fields raise."""
     definition = dict(STORE.fielddefs[kind][1])
 
     class Message:
@@ -54,13 +54,13 @@ def _filled(content: object, of: tuple) -> object:
 
 
 def sent(message) -> object:
-    """What arrives: a message through the wire format and back, which refuses wrong types and lengths."""
+    """A received message: the sent one through the wire format and back, which refuses wrong types and lengths."""
     whole = message.whole()
     return STORE.deserialize_cdr(STORE.serialize_cdr(whole, whole.__msgtype__), whole.__msgtype__)
 
 
 class Node:
-    """Keeps what is published, by topic."""
+    """Stores published messages by topic."""
 
     parameters: dict[str, str] = {}
 
@@ -87,7 +87,7 @@ class Time:
 
 
 def install(patch) -> None:
-    """Put the stand-in where the node imports ROS from."""
+    """Install the stand-in under the names that the node imports."""
     modules = {
         "rclpy": {"ok": lambda: True},
         "rclpy.node": {"Node": Node},

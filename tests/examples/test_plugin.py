@@ -1,4 +1,4 @@
-"""A package of somebody else, installed by pip: its method and its format are there, and no file of ours knows them."""
+"""A third-party package, installed by pip: its method and its format are found without a change of our files."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ PLUGIN = Path(__file__).parents[2] / "examples" / "plugin"
 
 @pytest.fixture(scope="module")
 def radarize(tmp_path_factory):
-    """The command where the package is installed; without it the same arguments end in an error."""
+    """The command with the package installed; without it the same arguments end in an error."""
     folder = tmp_path_factory.mktemp("installed")
     shutil.copytree(PLUGIN, folder / "source")
     install = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index"]

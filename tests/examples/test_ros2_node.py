@@ -75,7 +75,7 @@ def test_a_map_begins_at_its_smallest_corner(module):
 
 
 def test_covariances_are_on_the_axes_of_odom(module):
-    """Unsure ahead while facing left is unsure along y."""
+    """Uncertainty ahead, while facing left, is uncertainty along y."""
     message = ros.sent(module.odometry_message(0.0, np.array([0, 0, np.pi / 2]), np.zeros(2), np.diag([4.0, 1.0, 0.1])))
     spread = message.pose.covariance.reshape(6, 6)
     assert np.diag(spread) == pytest.approx([1, 4, 0, 0, 0, 0.1])

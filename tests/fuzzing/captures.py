@@ -1,4 +1,4 @@
-"""Readers of captures: configurations, poses, packets, samples."""
+"""Fuzzing of captures: configurations, poses, packets, samples."""
 
 import json
 import tempfile
@@ -27,7 +27,7 @@ from tests.packets import packets
 
 
 def cfg() -> Reader:
-    """SDK commands."""
+    """SDK configurations."""
 
     def read(path: Path) -> None:
         config, _ = load_config(path)
@@ -40,7 +40,7 @@ def cfg() -> Reader:
 
 
 def studio() -> Reader:
-    """A mmWave Studio folder: settings or setup damaged, the samples sound."""
+    """mmWave Studio folder: settings or setup damaged, the samples intact."""
     samples = encode(FRAMES, CONFIG).tobytes()
     mmwave, setup = _studio_texts()
 
@@ -61,7 +61,7 @@ def studio() -> Reader:
 
 
 def _studio_texts() -> tuple[str, str]:
-    """Settings that fit `CONFIG`, in the words of the public capture or, where that is absent, as few as will do."""
+    """Settings that fit `CONFIG`, based on the public capture, or minimal ones without it."""
     raw = {"rlDevDataFmtCfg_t": {"iqSwapSel": 1, "chInterleave": 1}, "rlDevLaneEnable_t": {"laneEn": "0x3"}}
     raw["rlDevDataPathCfg_t"] = {"transferFmtPkt0": "0x1"}
     profile = {
@@ -90,7 +90,7 @@ def _studio_texts() -> tuple[str, str]:
 
 
 def tum() -> Reader:
-    """Trajectories."""
+    """TUM trajectories."""
     lines = "\n".join(f"{0.1 * k:.3f} {k} 0 1.2 0 0 0 1" for k in range(20))
     return Reader(misspelled([f"# time x y z qx qy qz qw\n{lines}\n"]), file("poses.tum"), read_tum)
 
@@ -126,7 +126,7 @@ def udp_packets() -> Reader:
 
 
 def network_capture() -> Reader:
-    """A pcap of the stream."""
+    """Network capture (pcap) of the stream."""
     with tempfile.TemporaryDirectory() as folder:
         stream = [udp(packet.encode()) for packet in packets(encode(FRAMES, CONFIG).tobytes())]
         seeds = [pcap(Path(folder) / "a", stream).read_bytes(), pcap(Path(folder) / "b", stream, ">").read_bytes()]
@@ -136,7 +136,7 @@ def network_capture() -> Reader:
 
 
 def raw_words() -> Reader:
-    """A .bin, with settings by hand that need not fit it."""
+    """A .bin, with given settings that need not fit it."""
     seed = encode(FRAMES, CONFIG).tobytes()
     count = st.one_of(st.integers(-1, 300), st.sampled_from((0, 65535, 10**6, 2**31, 2**64)))
     given = st.fixed_dictionaries(
@@ -162,7 +162,7 @@ def raw_words() -> Reader:
 
 
 def arrays(kind: str) -> Reader:
-    """npy, npz or mat files, in every way of storing them."""
+    """npy, npz or mat files, in all storage formats."""
     with tempfile.TemporaryDirectory() as name:
         folder, seeds = Path(name), []
 

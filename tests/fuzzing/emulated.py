@@ -1,4 +1,4 @@
-"""What the emulated radar and capture card are told: lines of the serial port, and requests of the network."""
+"""Inputs of the emulated radar and capture card: lines of the serial port, and requests of the network."""
 
 from types import SimpleNamespace
 
@@ -14,7 +14,7 @@ from tests.fuzzing.reader import CONFIG, Reader
 
 
 def command_line() -> Reader:
-    """A session: a whole configuration and a start, misspelled, and on from there."""
+    """Session on the serial port: a configuration and a start, misspelled, and further commands."""
     whole = write_cfg(CONFIG)
 
     def read(text: str) -> None:
@@ -29,7 +29,7 @@ def command_line() -> Reader:
 
 
 def board() -> Reader:
-    """Requests, damaged, one after another."""
+    """Sequence of damaged requests."""
     sound = [Request(command).encode() for command in Opcode]
     sound += [
         Request(Opcode.CONFIGURE, RAW_TWO_LANES).encode(),
@@ -39,13 +39,13 @@ def board() -> Reader:
 
     def read(stream: list[bytes]) -> None:
         link = SimpleNamespace(recording=False, start=lambda gap, size: None, stop=lambda: None)
-        told = Board(link, lambda: None, lambda words: None)
+        board = Board(link, lambda: None, lambda words: None)
         for data in stream:
             try:
                 request = Request.decode(data)
             except InputError:
                 continue  # as the board's socket does
-            assert 0 <= told.execute(request) < 1 << 16
+            assert 0 <= board.execute(request) < 1 << 16
 
     inputs = st.lists(st.one_of(st.sampled_from(sound), damaged(sound)), min_size=1, max_size=8)
     return Reader(inputs, lambda stream, folder: stream, read, lambda stream: sum(map(len, stream)))

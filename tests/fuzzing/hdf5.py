@@ -1,4 +1,5 @@
-"""Recordings and runs with hostile content in sound HDF5: what no checksum finds, declared sizes above all."""
+"""Recordings and runs with hostile content in valid HDF5, such as wrong declared sizes, which checksums do not
+detect."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +25,7 @@ _VALUE = st.one_of(
 
 
 def edits(names: Sequence[str]) -> SearchStrategy[list[tuple]]:
-    """Edits of a file with data sets of such names, for `altered`."""
+    """Edits of a file with data sets of given names, for `altered`."""
     name = st.sampled_from(tuple(names))
     groups = st.sampled_from((*names, *sorted({path.split("/")[0] for path in names if "/" in path})))
     declared = st.tuples(st.sampled_from(_KINDS), st.lists(_HUGE, max_size=6), st.booleans(), st.booleans())

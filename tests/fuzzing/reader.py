@@ -1,4 +1,4 @@
-"""A reader of foreign bytes, and what an input must not do to it."""
+"""Definition of a reader of foreign bytes, and limits on its behaviour."""
 
 import re
 import shutil
@@ -18,8 +18,7 @@ from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
-#: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the
-#: input's.
+#: Largest processor time (s) and memory (bytes) of a reader: fixed buffers plus `MOST_TIMES` times the input.
 MOST_SECONDS, MOST_MEMORY, MOST_TIMES = 5.0, 96 << 20, 20
 #: 3,072 bytes a frame.
 CONFIG = RadarConfig(
@@ -49,7 +48,7 @@ class Reader:
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of an input: whether it was read, processor time (s), and memory beyond what was in use (bytes)."""
+    """Result of an input: whether it was read, processor time (s), and additional memory (bytes)."""
 
     accepted: bool
     seconds: float
@@ -85,13 +84,13 @@ def _peak_memory(anew: bool = False) -> int:
 
 
 def clear(folder: Path) -> None:
-    """Leave nothing in a folder."""
+    """Empty a folder."""
     for path in folder.iterdir():
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def file(name: str) -> Callable[[bytes, Path], Path]:
-    """Places an input as a file of such a name."""
+    """Store an input as a file of a given name."""
 
     def place(data: bytes, folder: Path) -> Path:
         (folder / name).write_bytes(data)
@@ -101,7 +100,7 @@ def file(name: str) -> Callable[[bytes, Path], Path]:
 
 
 def importing(**more) -> Callable[[Path], None]:
-    """Imports a file, and reads what came of it."""
+    """Import a file, and read the result."""
 
     def read(path: Path) -> None:
         use(import_recording(path, path.with_name("out.h5"), Given(**({"config": CONFIG} | more))))
@@ -110,7 +109,7 @@ def importing(**more) -> Callable[[Path], None]:
 
 
 def use(path: Path) -> None:
-    """Read a recording as the commands do."""
+    """Read a recording like the commands."""
     contents(path)
     with Recording(path) as recording:
         for name in recording.names():

@@ -1,4 +1,4 @@
-"""Readers of recordings and ROS bags."""
+"""Fuzzing of recordings and ROS bags."""
 
 import functools
 import tempfile
@@ -56,7 +56,7 @@ def _recording() -> tuple[bytes, bytes]:
 
 
 def recording() -> Reader:
-    """Our HDF5: bytes damaged (finished, without checksums, growing), or sound HDF5 with other content."""
+    """The project's HDF5: damaged bytes (finished, without checksums, growing), or valid HDF5 with other content."""
     with tempfile.TemporaryDirectory() as folder:
         new, old = Path(folder) / "new.h5", Path(folder) / "old.h5"
         new.write_bytes(_recording()[0])

@@ -1,4 +1,4 @@
-"""Readers of run folders, logs and weights."""
+"""Fuzzing of run folders, logs and weights."""
 
 import functools
 import tempfile
@@ -27,7 +27,7 @@ from tests.fuzzing.reader import Reader, file
 
 @functools.cache
 def sound_run() -> dict[str, bytes]:
-    """The files of a run that knows the truth."""
+    """Files of a run with ground truth."""
     with tempfile.TemporaryDirectory() as name:
         folder = write_run(Path(name) / "RUN", walked=2.0)
         run = RunFolder(folder)
@@ -39,7 +39,7 @@ def use_run(folder: Path) -> None:
     """Read all of a run."""
     Log.read(folder)
     run = RunFolder(folder)
-    _ = run.blind
+    _ = run.unobservable_spans
     for part in ("facts", "methods", "metrics", "trajectory", "odometry", "reference", "map"):
         getattr(run, part)
     if run.map is not None:
@@ -49,7 +49,7 @@ def use_run(folder: Path) -> None:
 
 
 def run_file(name: str, inputs: SearchStrategy) -> Reader:
-    """A run in which one file is damaged."""
+    """Run with one damaged file."""
 
     def place(data: bytes, folder: Path) -> Path:
         for other, content in sound_run().items():
@@ -61,7 +61,7 @@ def run_file(name: str, inputs: SearchStrategy) -> Reader:
 
 
 def run_scans() -> Reader:
-    """A run's HDF5: bytes damaged, or sound HDF5 with other content."""
+    """A run's HDF5: damaged bytes, or valid HDF5 with other content."""
     seed = sound_run()["scans.h5"]
     damages = run_file("scans.h5", st.one_of(damaged([seed]), edits(SHAPES)))
 
@@ -88,7 +88,7 @@ def log() -> Reader:
 
 
 def weights() -> Reader:
-    """A network's file."""
+    """Weights file of a network."""
     seeds = []
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "a.safetensors"
@@ -111,7 +111,7 @@ def weights() -> Reader:
 
 
 def _shown(path: Path) -> None:
-    """What the network would be shown of a radar that is not that of its training."""
+    """Input maps of the network for a radar other than that of its training."""
     radar = PRESETS["long-range"]
     header = load_weights(path, RotationNet, radar)[1]
     made = {name: np.zeros((2, radar.samples, 80), np.float16) for name in header.maps}

@@ -1,4 +1,4 @@
-"""Each reader of foreign bytes on damaged and hostile input; `benchmarks/fuzzing.py` is the long run of the same."""
+"""Every reader of foreign bytes on damaged and hostile input; `benchmarks/fuzzing.py` runs the same for longer."""
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings

@@ -1,4 +1,4 @@
-"""Readers of what worlds are made of, and inputs to try them on: scenes, maps, meshes, logs, data sets, settings."""
+"""Fuzzing of scene inputs: scenes, maps, meshes, logs, data sets, settings."""
 
 import json
 from collections.abc import Callable
@@ -51,7 +51,7 @@ def _text(seed: str, name: str, read: Callable[[Path], object]) -> Reader:
 
 
 def _log() -> Reader:
-    """Scans with poses, which may lie as far apart as a grid of a fixed number of cells permits."""
+    """Scans with poses, at most as far apart as a grid of a fixed number of cells permits."""
     text = _text(_LOG, "a.log", lambda path: carmen.grid(path, 0.05))
     return Reader(text.inputs, text.place, text.read, lambda data: len(data) + (8 << 20))
 
@@ -65,7 +65,7 @@ def _placed(inputs, name: str, read: Callable[[Path], object]) -> Reader:
 
 
 def a_map() -> Reader:
-    """A map_server's picture and its description."""
+    """map_server's image and its description."""
     plan = np.zeros((60, 80), np.uint8)
     plan[5:-5, 5:-5] = 254
 
@@ -88,7 +88,7 @@ def _import(path: Path) -> None:
 
 
 def mesh(kind: str) -> Reader:
-    """A box, in a format of `trimesh`'s."""
+    """Box in a format of `trimesh`."""
     data = _CUBE.export(file_type=kind)
     seed = data if isinstance(data, bytes) else data.encode()
     inputs = misspelled([seed.decode()]) if kind == "obj" else damaged([seed])
@@ -96,7 +96,7 @@ def mesh(kind: str) -> Reader:
 
 
 def gltf() -> Reader:
-    """A glTF of two nodes, as text."""
+    """glTF of two nodes, as text."""
     buffer = "data:application/octet-stream;base64," + "AAAA" * 12
     tree = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],

@@ -1,4 +1,4 @@
-"""Small files that stand for much: each is refused by its reader's budget, in a sentence and soon."""
+"""Small files that declare much data: each reader refuses them by its limits, quickly and with one sentence."""
 
 import io
 import json

@@ -57,7 +57,7 @@ def test_an_empty_table_is_its_head(terminal, capsys):
 
 
 def test_a_request_to_terminate_ends_as_ctrl_c_does(capsys, monkeypatch):
-    """What `kill`, a service manager and a queue of jobs send."""
+    """Signals sent by `kill`, a service manager or a job queue."""
     app, before = new_app("Ends."), signal.getsignal(signal.SIGTERM)
     app.command("wait")(lambda: os.kill(os.getpid(), signal.SIGTERM))
     try:
@@ -70,7 +70,7 @@ def test_a_request_to_terminate_ends_as_ctrl_c_does(capsys, monkeypatch):
 
 @pytest.fixture
 def printed(terminal, capsys):
-    """Words of what a command prints; none of its lines is too long."""
+    """Return the words that a command prints; no line may exceed the terminal."""
 
     def call(app, *arguments: object) -> list[str]:
         with pytest.raises(SystemExit) as exit_:
@@ -83,7 +83,7 @@ def printed(terminal, capsys):
 
 
 def test_an_imported_part_keeps_its_name_whole(printed, tmp_path, monkeypatch):
-    """Names of a modelling program are long; so is the pattern that chose the material."""
+    """Names from modelling programs are long, and so are the patterns that select materials."""
     monkeypatch.chdir(tmp_path)
     part, pattern = "Storey2:CupboardDoor:Handle", "Storey2:Cupboard*"
     scene = trimesh.Scene()
@@ -121,7 +121,7 @@ def test_attributes_written_as_json_break_between_figures(terminal, capsys):
 
 @pytest.mark.parametrize("app", [radarize.cli.app, radarsim.cli.app], ids=["radarize", "radarsim"])
 def test_help_cuts_no_word(app, printed):
-    """Nothing is shortened, and choices stand in one piece."""
+    """No text is cut, and choices are not broken."""
 
     def check(command, path: tuple[str, ...]) -> None:
         words = printed(app, *path, "--help")
@@ -134,7 +134,7 @@ def test_help_cuts_no_word(app, printed):
 
 
 def test_progress_without_a_terminal_is_lines(monkeypatch, capsys):
-    """Every so often, of what was done last, whether it moves or not; and nothing of what is quickly done."""
+    """Lines at fixed intervals with the latest progress, changed or not; none for quick steps."""
     with progress("simulate") as report:
         report(1, 4)
     assert capsys.readouterr().err == ""

@@ -1,4 +1,4 @@
-"""A recording in which something is damaged: it costs the frames that it lies in, and they are counted."""
+"""Damaged recordings: only the affected frames are lost, and they are counted."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ TIMES = 1.7e9 + PERIOD * np.arange(COUNT)
 
 @pytest.fixture
 def walk(tmp_path):
-    """A whole recording, with a row of a stream for each frame and some points for each."""
+    """A complete recording with one row per frame of one stream, and some points per frame."""
     streams = {
         "truth/pose": Stream((7,), "f8", "m", ""),
         "truth/depth": Stream((100, 90), "u2", "mm", ""),
@@ -146,7 +146,7 @@ def test_one_wrong_stamp_is_made_anew(walk, wrong, place):
         assert np.array_equal(recording.adc(place, place + 1)[0], ADC[place])
         if wrong != "twice" or place:
             assert recording.damage == [
-                "1 of 40 stamps in /radar/time are damaged: 1 are made anew from the frame period"
+                "1 of 40 stamps in /radar/time are damaged: 1 are interpolated by the frame period"
             ]
     part = walk.rename(walk.with_name("b.h5.part"))
     with Recording(recover(part)) as recording:
@@ -155,7 +155,7 @@ def test_one_wrong_stamp_is_made_anew(walk, wrong, place):
 
 
 def test_frames_whose_time_nobody_can_tell_are_left_out(walk):
-    """Two frames were lost before them, or between them, or behind them."""
+    """Two frames are missing before, between or after them."""
     times = TIMES.copy()
     times[12:] += 2 * PERIOD
     times[10:13] = np.nan
@@ -181,7 +181,7 @@ def test_a_block_of_stamps_that_was_never_written(walk, value):
     stamped(walk, np.full(COUNT, value))
     with Recording(walk) as recording:
         assert np.allclose(np.diff(recording.times), PERIOD) and np.array_equal(recording.adc(0, COUNT), ADC)
-        assert "40 are made anew" in recording.damage[0] or "39 are made anew" in recording.damage[0]
+        assert "40 are interpolated" in recording.damage[0] or "39 are interpolated" in recording.damage[0]
 
 
 def test_frames_without_stamps_and_samples_were_not_written(walk):
@@ -206,7 +206,7 @@ def test_data_sets_of_other_lengths(walk, tmp_path, name):
 
 
 def test_stamps_that_go_back():
-    """The clock was set back by 5 s at half of the walk: one half's stamps go on from the other's."""
+    """The clock was set back by 5 s in the middle of the walk: the stamps of one half are kept, the other continues."""
     times = 0.1 * np.arange(200)
     times[100:] -= 5
     found = Stamps(times, 0.1)
@@ -220,7 +220,7 @@ def test_sound_stamps_stay_as_they_are():
 
 
 def test_what_is_flushed_is_on_the_disk(tmp_path, monkeypatch):
-    """Samples before their stamps: every frame that counts is whole after a power cut."""
+    """Samples are written before their stamps, so that all frames that count are complete after a power cut."""
     from radarize.io.recording import writer as writer_module
 
     synced, real = [], os.fsync

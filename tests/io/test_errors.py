@@ -22,7 +22,7 @@ def test_reasons_of_libraries():
 
 
 def fails(error: Exception):
-    """A job that meets an error while it writes, and says so in its own words."""
+    """A job that raises an error while it writes, with a message of its own."""
 
     def job(report):
         with explained("x.h5: schade", type(error)):
@@ -41,7 +41,7 @@ def fails(error: Exception):
     ],
 )
 def test_a_full_disk_is_known_by_its_number(error, full):
-    """From the system's error, in any language, through the sentence and the job that it ends, to another process."""
+    """A full disk is recognised from the system's error, in any language, in the sentence and across processes."""
     news = pickle.loads(pickle.dumps(attempt("a", fails(error), print)))
     assert news.full == full and isinstance(news.failure, DiskFull) == full
     assert news.error.startswith("x.h5: schade") and disk_full(error) == full

@@ -1,4 +1,4 @@
-"""Files that would have HDF5 read others: refused wherever a file is opened, before any of it is read."""
+"""HDF5 files that refer to other files are refused by every reader, before anything is read."""
 
 import h5py
 import numpy as np
@@ -35,7 +35,7 @@ def link(file, name, secret):
 
 
 def behind(file, name, secret):
-    """A soft link that leads through an external one."""
+    """A soft link through an external link."""
     link(file, "deep/within/away", secret)
     file[name] = h5py.SoftLink("/deep/within/away")
 

@@ -82,7 +82,7 @@ def messages(data: bytes, kind: int) -> list[int]:
 
 
 def test_other_software_can_read_it(tmp_path):
-    """HDF5 1.10 knows layouts to version 4 and types to 3; HDF5 2.0 writes newer ones, which older ones do not read."""
+    """HDF5 1.10 reads layouts up to version 4 and types up to 3; HDF5 2.0 writes newer ones, which it cannot read."""
     path = tmp_path / "a.h5"
     with RecordingWriter(path, CONFIG, products={"truth/floor_plan": Product(np.eye(4), "m", "walls")}) as writer:
         writer.append(frames(0, 3), np.arange(3.0))
@@ -158,7 +158,7 @@ def test_readers_follow_a_growing_recording_and_survive_its_death(process, tmp_p
 
 
 def test_what_is_damaged_in_a_growing_recording_is_refused_at_once(process, tmp_path):
-    """In HDF5's multiple-reader mode it would try again without end."""
+    """HDF5's multiple-reader mode would retry forever."""
     process.kill()
     process.wait()
     whole = (tmp_path / "a.h5.part").read_bytes()
@@ -185,7 +185,7 @@ def test_hdf5s_checksum():
 
 
 def test_declared_sizes_are_not_believed(tmp_path):
-    """Four terabytes of times in a file of some kilobytes, and a hundred thousand chunks of nothing."""
+    """Four terabytes of times in a file of some kilobytes, and a hundred thousand empty chunks."""
     with RecordingWriter(tmp_path / "a.h5", CONFIG) as writer:
         writer.append(frames(0, 2), np.arange(2.0))
     whole = (tmp_path / "a.h5").read_bytes()
@@ -206,7 +206,7 @@ def test_ctrl_c_keeps_every_frame(process, tmp_path):
 
 
 def test_flushes_come_by_themselves(tmp_path):
-    """Once a second of recorded time."""
+    """Frames are flushed once per second of recorded time."""
     slow = CONFIG.model_copy(update={"frame_period": 0.4})
     with RecordingWriter(tmp_path / "a.h5", slow) as writer:
         for i in range(7):
@@ -216,7 +216,7 @@ def test_flushes_come_by_themselves(tmp_path):
 
 
 def test_same_content_same_bytes(tmp_path):
-    """Whenever, and however slowly, it was written."""
+    """The content does not depend on when and how fast it was written."""
     for name, pause in (("a.h5", 0.0), ("b.h5", 0.4)):
         streams = {"imu/time": Stream((), "f8", "s", "", "imu/time")}
         with RecordingWriter(tmp_path / name, CONFIG, attributes={"seed": 7}, streams=streams) as writer:
@@ -304,7 +304,7 @@ def test_a_truncated_recording_is_refused(tmp_path, keep, state):
             writer.append(frames(i, i + 1), np.array([float(i)]))
         writer.flush()
         shutil.copyfile(writer.part, path)
-        os.truncate(path, writer._file.id.get_filesize())  # without what is claimed and not used
+        os.truncate(path, writer._file.id.get_filesize())  # without unused reserved bytes
     if state == "finished":
         shutil.copyfile(tmp_path / "a.h5", path)
     with Recording(path) as recording:

@@ -1,4 +1,4 @@
-"""A full disk is told with the file's name, whatever found it."""
+"""A full disk is reported with the file's name, whichever call finds it."""
 
 import errno
 

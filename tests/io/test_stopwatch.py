@@ -1,4 +1,4 @@
-"""Time by stage: of whichever stopwatch runs, and without what other stages within took."""
+"""Time by stage of the running stopwatch, without the time of nested stages."""
 
 import time
 
@@ -8,7 +8,7 @@ from radarize.io.stopwatch import Stopwatch, stage
 
 
 class Clock:
-    """Time that passes when it is told to."""
+    """A clock that the test advances."""
 
     def __init__(self, monkeypatch):
         self.now = 5.0

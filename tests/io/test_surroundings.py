@@ -1,4 +1,4 @@
-"""What surrounds a command: names of files, its working folder, shared memory, and how early it is stopped."""
+"""Environment of a command: file names, working folder, shared memory, and early interrupts."""
 
 import errno
 import os
@@ -50,11 +50,11 @@ def test_a_working_folder_that_was_deleted(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == 2
-    assert done.stderr == "radarize: the working folder was deleted, expected one that is there: cd to another\n"
+    assert done.stderr == "radarize: the working folder was deleted, expected an existing one: cd to another\n"
 
 
 def test_shared_memory_that_is_full(monkeypatch):
-    """Semaphores are files without a name in it."""
+    """Semaphores are unnamed files in shared memory."""
     error = OSError(errno.ENOSPC, "No space left on device")
     usage = namedtuple("usage", "total used free")
     for free, words in (

@@ -1,11 +1,11 @@
-"""People about: in the radar's view, not in its way, and not in walls."""
+"""Pedestrians: in the radar's view, not on its path, and not in walls."""
 
 import numpy as np
 import pytest
 
 from radarize.io.errors import InputError
 from radarize.radar.presets import PRESETS
-from radarsim.motion.pedestrians import crowded
+from radarsim.motion.pedestrians import with_pedestrians
 from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
@@ -21,13 +21,13 @@ def walk():
 
 
 def places(scene: Scene) -> np.ndarray:
-    """Of people's trunks, (person, time, 3), m."""
+    """Positions of people's trunks, (person, time, 3), m."""
     return np.stack([who.poses(TIMES)[1][:, 0] for who in scene.movers])
 
 
 def test_people_keep_their_distance(walk):
     scene, motion = walk
-    busy = crowded(scene, motion, 3, 3)
+    busy = with_pedestrians(scene, motion, 3, 3)
     people = places(busy)
     assert len(people) == 3 and not scene.movers and busy.objects == scene.objects
     radar = motion.position(TIMES)
@@ -38,15 +38,15 @@ def test_people_keep_their_distance(walk):
     for person in people:
         standing = column(person[::10, :2], 0.5, 1.7, 0.2)
         assert least_distance(standing, obstacles(scene)).min() > 0.16
-    assert np.array_equal(places(crowded(scene, motion, 3, 3)), people)
-    assert not np.array_equal(places(crowded(scene, motion, 3, 4)), people)
+    assert np.array_equal(places(with_pedestrians(scene, motion, 3, 3)), people)
+    assert not np.array_equal(places(with_pedestrians(scene, motion, 3, 4)), people)
 
 
 def test_somebody_is_seen(walk):
     scene, motion = walk
     plain, busy = (
         Scenario(each, motion, PRESETS["radarize"], seed=3, sensors=())
-        for each in (scene, crowded(scene, motion, 3, 3))
+        for each in (scene, with_pedestrians(scene, motion, 3, 3))
     )
     from radarsim.sensors.scan import PlanarScan
 
@@ -56,11 +56,11 @@ def test_somebody_is_seen(walk):
     assert nearer.any() and not (full > empty + 1e-3).any()
 
 
-def test_none_is_none_and_a_full_room_is_told(walk):
+def test_none_is_none_and_a_full_room_is_an_error(walk):
     scene, motion = walk
-    assert crowded(scene, motion, 0, 3) is scene
+    assert with_pedestrians(scene, motion, 0, 3) is scene
     floor = {"name": "floor", "shape": "rectangle", "size": [2.2, 2.2], "facing": [0, 0, 1], "material": "concrete"}
     cell = Scene.of({"objects": [floor]}, "cell")
     to_and_fro = Walk("handheld", 2.0, waypoints=np.array([[0.0, 0.0], [0.1, 0.0]])).through(cell, 0)
-    with pytest.raises(InputError, match="scene cell: has room for 0 people beside the radar's way, expected 2"):
-        crowded(cell, to_and_fro, 2, 0)
+    with pytest.raises(InputError, match="scene cell: has room for 0 people beside the radar's path, expected 2"):
+        with_pedestrians(cell, to_and_fro, 2, 0)

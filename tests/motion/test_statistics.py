@@ -1,4 +1,4 @@
-"""Statistics of motions that can be worked out by hand."""
+"""Statistics of motions against values calculated manually."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_straight_on(course, share):
 
 
 def test_turning_on_the_spot():
-    """The sensor on its lever arm goes round a circle; what carries it stands."""
+    """The sensor on its lever arm moves on a circle; the platform stands."""
     motion = Motion.linear((0, 0, 1), (0, 0, 0), yaw_rate=0.8, lever_arm=(0.2, 0, 0), duration=5.0)
     found = Statistics.of(motion)
     assert found.standing == 1.0

@@ -122,14 +122,14 @@ def test_hand_faces_other_ways_and_wheels_follow_their_line(tours):
     assert 0.3 < (hand < 30).mean() < 0.9 and (hand > 60).mean() > 0.05
     for platform in ("cart", "robot"):
         wheels = np.concatenate([angles(tours[platform, s]) for s in SEEDS])
-        # Ahead or straight back, and ahead for most of the time: by cart 0.5 to 1.0 of a tour, 0.8 on average.
+        # Ahead or straight back, and ahead for most of the time: for the cart 0.5 to 1.0 of a tour, 0.8 on average.
         assert np.minimum(wheels, 180 - wheels).max() < 35
         assert (wheels < 35).mean() > 0.5
 
 
 @pytest.mark.parametrize("platform", list(PLATFORMS))
 def test_no_jerk(tours, platform):
-    """Muscles and motors take time: acceleration never jumps, though gait makes it swing."""
+    """Acceleration is continuous, also with gait: muscles and motors need time."""
     t = np.arange(0, DURATION, 0.01)
     most = {"handheld": 60.0, "cart": 6.0, "robot": 6.0}[platform]
     for seed in SEEDS:
@@ -138,7 +138,8 @@ def test_no_jerk(tours, platform):
 
 
 def test_hand_comes_back(tours):
-    """Somewhere in each tour the hand is within a metre of where it was ten or more seconds and five metres before."""
+    """In each handheld tour the sensor returns to within a metre of a place visited at least ten seconds and five
+    metres before."""
     t = np.arange(0, DURATION, 0.25)
     for seed in SEEDS:
         motion = tours["handheld", seed]
@@ -207,7 +208,7 @@ BENT = ["0 0 0 0 0 0 0 1", "0.5 5 0 0 0 0 0 1", "1 9 0 0 0 0 0 1"]
 
 
 @pytest.mark.parametrize(
-    ("rows", "complaint"),
+    ("rows", "message"),
     [
         ([*GOOD[:3], "100.3 nan 0 1 0 0 0 1", *GOOD[4:]], "line 5: .*expected finite numbers"),
         ([*GOOD[:3], GOOD[2]], "line 5: has time .* ascending"),
@@ -224,8 +225,8 @@ BENT = ["0 0 0 0 0 0 0 1", "0.5 5 0 0 0 0 0 1", "1 9 0 0 0 0 0 1"]
         ([*BENT, "109 9 0 0 0 0 0 1", "109.01 9.1 0 0 0 0 0 1"], "between times 1.000 and 109.000 a smooth curve"),
     ],
 )
-def test_bad_tum(tmp_path, rows, complaint):
-    with pytest.raises(InputError, match=complaint):
+def test_bad_tum(tmp_path, rows, message):
+    with pytest.raises(InputError, match=message):
         motion_from_tum(tum(tmp_path, rows))
 
 

@@ -19,14 +19,14 @@ T = np.arange(2.0, 118.0, 1 / 200)  # off the ends
 
 
 def straight(speed: float) -> Motion:
-    """Along x at a constant speed (m/s), with knots as of a planned tour."""
+    """Motion along x at constant speed (m/s), with knots as in a planned tour."""
     times = np.arange(-1.0, 121.0, 0.02)
     motion = Motion.linear((0, 0, 0), (speed, 0, 0), duration=120.0)
     return Motion(120.0, type(motion.path)(times, np.outer(times, [speed, 0, 0])), motion.attitude)
 
 
 def shaken(speed: float, vibration: Vibration, seed: int = 0):
-    """Displacement of a straight motion, m."""
+    """Displacement of a straight motion by vibration, m."""
     motion = straight(speed)
     return vibrating(motion, vibration, np.random.default_rng(seed)).position(T) - motion.position(T)
 
@@ -56,13 +56,13 @@ def test_spectrum_is_a_floors():
 def test_axes_and_seeds_are_independent():
     first, second = shaken(1.0, WHEELS, 1), shaken(1.0, WHEELS, 2)
     assert np.array_equal(first, shaken(1.0, WHEELS, 1))
-    alike = np.corrcoef(np.concatenate([first, second], axis=1).T) - np.eye(6)
-    assert np.abs(alike).max() < 0.15
+    correlation = np.corrcoef(np.concatenate([first, second], axis=1).T) - np.eye(6)
+    assert np.abs(correlation).max() < 0.15
 
 
 @pytest.mark.parametrize("platform", list(PLATFORMS))
 def test_position_velocity_acceleration_agree(platform):
-    """Differences of position are velocity, those of velocity are acceleration: what IMU and Doppler follow from."""
+    """Velocity is the derivative of position, acceleration that of velocity; IMU and Doppler depend on it."""
     office = Scene.load("office")
     walk = Walk(platform, duration=20.0).through(office, 3)
     t, step = np.linspace(0.0, 20.0, 2003), 1e-5
@@ -79,7 +79,7 @@ def test_position_velocity_acceleration_agree(platform):
 
 @pytest.mark.parametrize("platform", list(PLATFORMS))
 def test_path_lengths_are_parabolas_over_a_burst(platform):
-    """What the burst's parabola leaves of a vibration, out and back, is below 1 degree of phase (RMS)."""
+    """The residual of a vibration beyond the burst's parabola is below 1 degree of two-way phase (RMS)."""
     config = PRESETS["radarize"]
     clock = BurstClock.of(config)
     motion, vibration = straight(PLATFORMS[platform].speed), PLATFORMS[platform].vibration

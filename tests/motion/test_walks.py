@@ -1,4 +1,4 @@
-"""Buildings from random seeds, and a walk through each that touches nothing."""
+"""Buildings from random seeds, and a collision-free walk through each."""
 
 import numpy as np
 import pytest

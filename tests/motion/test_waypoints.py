@@ -1,4 +1,4 @@
-"""Walks through way-points, and what is wrong with way-points, in a sentence."""
+"""Walks through way-points, and error messages for unusable way-points."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def office() -> Scene:
 
 @pytest.fixture(scope="module")
 def rooms(office) -> np.ndarray:
-    """Places in four rooms and the corridor that a person can stand at, found by looking for a free square metre."""
+    """Free places in four rooms and the corridor at which a person can stand."""
     things = obstacles(office)
     rng = np.random.default_rng(0)
     found = [[9.0, 6.0]]
@@ -84,7 +84,7 @@ def test_files(tmp_path, name, text):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "complaint"),
+    ("name", "text", "message"),
     [
         ("a.yaml", "- [1, 2]\n- [1, x]\n", "a.yaml, way-point 2: is '1 x', expected two finite numbers"),
         ("a.yaml", "- [1, 2]\n- '34'\n", "a.yaml, way-point 2: is '34'"),
@@ -97,29 +97,29 @@ def test_files(tmp_path, name, text):
         ("a.csv", "", "a.csv: holds 0 way-points"),
     ],
 )
-def test_bad_files(tmp_path, name, text, complaint):
+def test_bad_files(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
-    with pytest.raises(InputError, match=complaint):
+    with pytest.raises(InputError, match=message):
         read_waypoints(tmp_path / name)
     with pytest.raises(InputError, match="gone.csv: no such file"):
         read_waypoints(tmp_path / "gone.csv")
 
 
 @pytest.mark.parametrize(
-    ("place", "complaint"),
+    ("place", "message"),
     [
         ([9.0, 5.2], r"office, platform handheld: way-point 2 \(x 9.00, y 5.20 m\) lies 0.[012]. m .*0.40 m or more"),
         ([9.0, 4.92], r"way-point 2 .* lies where there is no floor"),
         ([99.0, 3.0], "way-point 2 .* lies outside the scene"),
     ],
 )
-def test_places_nobody_can_stand_at(office, place, complaint):
-    with pytest.raises(InputError, match=complaint):
+def test_places_nobody_can_stand_at(office, place, message):
+    with pytest.raises(InputError, match=message):
         plan_motion(office, "handheld", None, np.random.default_rng(0), np.array([PLACES[0], place]))
 
 
 def test_places_behind_a_closed_door(tmp_path):
-    """Two rooms with a wall between."""
+    """Two rooms separated by a wall."""
     (tmp_path / "cells.yaml").write_text(
         "objects:\n"
         "  - {name: floor, shape: box, size: [8, 4, 0.1], position: [0, 0, -0.05], material: concrete}\n"
@@ -132,8 +132,8 @@ def test_places_behind_a_closed_door(tmp_path):
     assert plan_motion(scene, "robot", None, np.random.default_rng(0), places[:2]).duration > 3
 
 
-def test_the_recording_tells_its_motion(tmp_path):
-    """Through way-points at the command line, cut short; and along poses through a wall."""
+def test_the_recording_describes_its_motion(tmp_path):
+    """Statistics of a recording: through way-points on the command line, cut short; and along poses through a wall."""
     from radarsim.cli import app
 
     (tmp_path / "way.csv").write_text("0 0\n1 0.5\n")

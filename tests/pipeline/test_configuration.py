@@ -77,7 +77,7 @@ def test_a_file_says_what_differs(tmp_path):
 
 
 def test_methods_get_their_settings():
-    """Those of the heat maps in every batch, those of scans and SLAM where they are used."""
+    """Settings of heat maps are used in every batch, those of scans and SLAM in their steps."""
     mine = Configuration.model_validate(
         Configuration().model_dump() | {"heatmaps": {"loading": 0.3}, "scans": {"min_range": 1.5}}
     )

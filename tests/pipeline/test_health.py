@@ -1,4 +1,4 @@
-"""What is said of spans in which odometry has a hard time: of tracks made by hand, and of a recording."""
+"""Spans in which odometry is degraded, their kind and advice: of synthetic tracks, and of a recording."""
 
 import json
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
 
 CONFIG, PERIOD, COUNT = PRESETS["radarize"], 0.05, 200
-#: A single transmitter at the same loop time, which cannot tell aliased speeds, and one half as fast.
+#: A single transmitter at the same loop time, with which speeds are ambiguous, and one with half the maximum speed.
 SINGLE, SLOW = (
     CONFIG.model_copy(update={"tx_order": (0,), "idle_time": CONFIG.idle_time + more * CONFIG.chirp_time})
     for more in (2, 5)
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 def result(start=1.7e9, fast=(), empty=(), no_turn=(), hit=(), dead=(), rx=0):
-    """A walk of 1 m/s in a furnished room, with frames in which it is another."""
+    """A walk at 1 m/s in a furnished room, with frames in which a condition differs."""
     frames = np.arange(COUNT)
     velocity = np.tile([1.0, 0.0], (COUNT, 1))
     velocity[list(fast)] = [0.0, -1.8]
@@ -61,9 +61,9 @@ def health(radar=CONFIG, **conditions):
 @pytest.mark.parametrize(
     ("condition", "kind", "advice"),
     [
-        ("no_turn", "blind", "turn more slowly"),
-        ("fast", "aliased", "speeds alias beyond 1.83 m/s: move more slowly, or use the `two-tx` preset"),
-        ("empty", "out of reach", "few surfaces within 4.2 m: the `long-range` preset sees 20"),
+        ("no_turn", "unobservable", "turn more slowly"),
+        ("fast", "aliased", "speeds above 1.83 m/s are aliased: move more slowly, or use the `two-tx` preset"),
+        ("empty", "out of reach", "few surfaces within 4.2 m: the `long-range` preset measures up to 20 m"),
         ("hit", "disturbed", "another radar may be near"),
         ("dead", "disturbed", "RX1 is dead"),
     ],
@@ -77,14 +77,14 @@ def test_each_kind_has_its_span_and_advice(condition, kind, advice):
     assert "from 1.9 to 4.0 s" in warning or "from 2.0 to 4.0 s" in warning
 
 
-def test_nothing_is_said_of_a_walk_without_trouble_nor_of_blinks():
+def test_a_walk_without_degradation_or_with_short_ones_has_no_findings():
     assert health().found == [] and health().warnings() == []
     blinks = [*range(10, 15), *range(50, 55)]
     assert health(fast=blinks, empty=blinks, no_turn=blinks, hit=blinks, dead=blinks).found == []
 
 
-def test_speeds_that_transmitters_tell_apart_are_no_trouble():
-    """1.8 m/s is near the unambiguous speed of the preset, which tells speeds up to 3 m/s."""
+def test_speeds_resolved_by_several_transmitters_are_no_finding():
+    """1.8 m/s is near the unambiguous speed of a loop in the preset, which resolves speeds up to 3 m/s."""
     assert health(fast=range(40, 80)).found == []
     slower = CONFIG.model_copy(update={"idle_time": CONFIG.idle_time + CONFIG.chirp_time})
     assert health(slower, fast=range(40, 80)).warnings() == []
@@ -95,14 +95,14 @@ def test_the_receiver_has_the_boards_number():
     assert health(radar, dead=range(COUNT), rx=2).found[0].advice.startswith("RX4 is dead")
 
 
-def test_a_limit_below_walking_pace_is_said_whatever_the_speed():
+def test_a_limit_below_walking_pace_is_a_warning_at_any_speed():
     (warning,) = Health(SLOW).warnings()
-    assert warning == f"the configuration's speed limit of {SLOW.max_velocity:.2f} m/s is below walking pace"
+    assert warning == f"the configuration's maximum speed of {SLOW.max_velocity:.2f} m/s is below walking pace"
     (span,) = health(SLOW, fast=range(40, 80)).found  # at 1 m/s all echoes ahead alias
     assert "is below walking pace: the `two-tx` preset measures up to 5.5 m/s" in span.advice
 
 
-def test_run_and_report_say_it(tmp_path, capsys):
+def test_run_and_report_show_the_advice(tmp_path, capsys):
     """Half a second with a receiver that is dead and chirps that are disturbed."""
     rng = np.random.default_rng(0)
     times, room = np.arange(16) * CONFIG.frame_period, furnished_room(rng, density=6.0, boxes=4)
@@ -117,12 +117,12 @@ def test_run_and_report_say_it(tmp_path, capsys):
     assert stopped.value.code == 0
     err, facts = capsys.readouterr().err, json.loads((tmp_path / "RUN" / "run.json").read_text())
     assert facts["chirps_disturbed"] == 16
-    told = {each["advice"] for each in facts["health"] if each["kind"] == "disturbed"}
-    assert len(told) == 2 and all(set(each) == {"kind", "start_s", "stop_s", "advice"} for each in facts["health"])
+    advice = {each["advice"] for each in facts["health"] if each["kind"] == "disturbed"}
+    assert len(advice) == 2 and all(set(each) == {"kind", "start_s", "stop_s", "advice"} for each in facts["health"])
     page = report_run(tmp_path / "RUN").read_text()
-    for advice in told:
-        assert advice in err and advice in page
-    assert any("RX3 is dead" in advice for advice in told)
+    for each in advice:
+        assert each in err and each in page
+    assert any("RX3 is dead" in each for each in advice)
 
 
 def test_frames_that_never_came_are_a_gap(tmp_path):
@@ -134,8 +134,8 @@ def test_frames_that_never_came_are_a_gap(tmp_path):
     with RecordingWriter(tmp_path / "walk.h5", CONFIG) as writer:
         writer.append(adc, times)
         assert writer.losses.warnings() == ["61 frames are missing between others"]
-    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo").path
-    facts = RunFolder(told).facts
+    folder = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo").path
+    facts = RunFolder(folder).facts
     gap = max(facts["blind"]["spans"], key=lambda span: span["stop_s"] - span["start_s"])
     assert "frames lost" in gap["why"] and gap["stop_s"] - gap["start_s"] > 1.9 and facts["frames_missing"] == 61
     assert any("frames did not arrive" in each["advice"] for each in facts["health"])
@@ -148,13 +148,13 @@ def test_time_per_frame_is_that_of_the_frames_used(tmp_path, monkeypatch):
         noise = np.random.default_rng(0).integers(-200, 200, (8, *CONFIG.frame_shape), dtype=np.int16)
         writer.append(noise, np.arange(8) * CONFIG.frame_period)
     with load(tmp_path / "walk.h5") as recording:
-        told = run(recording[::4], tmp_path / "RUN", odometry="doppler", scans="first-echo").path
-    assert RunFolder(told).facts["ms_per_frame"] == {"slam": 500.0}
+        folder = run(recording[::4], tmp_path / "RUN", odometry="doppler", scans="first-echo").path
+    assert RunFolder(folder).facts["ms_per_frame"] == {"slam": 500.0}
 
 
 def test_damaged_facts_are_one_sentence(tmp_path):
     (tmp_path / "trajectory.tum").write_text("0 0 0 0 0 0 0 1\n")
-    (tmp_path / "run.json").write_text(json.dumps({"health": [{"kind": "blind", "start_s": "noon"}]}))
+    (tmp_path / "run.json").write_text(json.dumps({"health": [{"kind": "unobservable", "start_s": "noon"}]}))
     with pytest.raises(InputError, match="run.json: health.0.start_s is 'noon'"):
         _ = RunFolder(tmp_path).health
     (tmp_path / "run.json").write_text(json.dumps({"warnings": 3}))

@@ -1,4 +1,4 @@
-"""Plain files: what is read, what is written, and what is refused."""
+"""SLAM on plain files: input, output, and refused files."""
 
 import json
 import tracemalloc

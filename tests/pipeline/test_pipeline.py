@@ -47,7 +47,7 @@ def test_writes_everything(finished):
 
 
 def test_odometry_and_slam_follow_the_truth(finished):
-    """Better than 5 % of the distance travelled; and the heading turns the way the sensor turned."""
+    """The error is below 5 % of the distance travelled, and the heading has the correct sign."""
     errors = evaluate(finished)
     assert errors["odometry"]["ate"]["position"]["mean"] < 0.05 * errors["odometry"]["distance"]
     assert errors["slam"]["ate"]["position"]["mean"] < 0.05 * errors["odometry"]["distance"]
@@ -62,7 +62,7 @@ def test_odometry_and_slam_follow_the_truth(finished):
 
 
 def test_velocity_against_truth(finished):
-    """Both components of the ego-velocity, with their signs."""
+    """Both components of the velocity are correct, with their signs."""
     with h5py.File(finished / "scans.h5") as file:
         error = np.abs(file["velocity"][:] - file["truth/velocity"][:, :2])
     assert (np.median(error, axis=0) < 0.03).all()
@@ -78,7 +78,7 @@ def test_scans_mostly_end_at_surfaces(finished):
 
 
 def follow(adc, times, valid=None, size=16, config=PRESETS["radarize"]) -> tuple[list[Result], Pipeline, Preprocessor]:
-    """Results of the methods without networks, which are the fastest."""
+    """Results of the methods without networks, which are fastest."""
     inputs = Inputs(config)
     pipeline, preprocessor = make_pipeline(inputs, **CLASSICAL), Preprocessor(inputs.signal)
     return list(pipeline.run(stream(preprocessor, adc, times, valid, size))), pipeline, preprocessor
@@ -89,7 +89,8 @@ def poses(results: list[Result]) -> np.ndarray:
 
 
 def test_batches_do_not_matter(walk):
-    """Frames one by one or in sixteens: the same trajectory and map, so a live stream gives what a file gives."""
+    """Frames one by one or in sixteens give the same trajectory and map, so a live stream gives the result of a
+    file."""
     with Recording(walk) as source:
         adc, times = source.adc(0, 48), source.times[:48]
     (one, slow, _), (two, _, _), (other, fast, _) = (follow(adc, times, size=size) for size in (1, 2, 16))
@@ -101,7 +102,7 @@ def test_batches_do_not_matter(walk):
 
 
 def test_lost_chirps_do_no_harm(walk, tmp_path):
-    """A fifth of the chirps zeroed and marked: still a trajectory, still finite, still close."""
+    """With a fifth of the chirps zeroed and marked, the trajectory is finite and close."""
     rng = np.random.default_rng(0)
     with Recording(walk) as source, RecordingWriter(tmp_path / "lossy.h5", source.config) as writer:
         adc = source.adc(0, 120)
@@ -116,7 +117,7 @@ def test_lost_chirps_do_no_harm(walk, tmp_path):
 
 
 def spoil(walk, valid):
-    """The walk's first frames with the chirps lost that are not valid."""
+    """The first frames of the walk, with the invalid chirps lost."""
     frames = len(valid)
     with Recording(walk) as source:
         adc = source.adc(0, frames)
@@ -158,7 +159,7 @@ def test_lost_bursts_and_frames_leave_a_gap(walk, unspoilt, lost, frames, tolera
 
 
 def test_everything_lost(walk, tmp_path):
-    """No crash, nothing seen, nothing moved; and a run of such a recording says so."""
+    """No crash, no scans, no motion; and a run of such a recording is an error."""
     results, pipeline, preprocessor = spoil(walk, np.zeros((40, 32, 3), bool))
     assert results == [] and preprocessor.lost == 40 and not pipeline.slam.nodes
     with Recording(walk) as source, RecordingWriter(tmp_path / "lost.h5", source.config) as writer:
@@ -187,7 +188,7 @@ def test_a_run_over_lost_frames_keeps_rows_and_truth_together(walk, tmp_path):
 
 
 def test_every_second_frame_is_a_radar_of_half_the_rate(walk, tmp_path):
-    """The same as of a recording that has no others: poses, scans, and truth beside them."""
+    """The result equals that of a recording without other frames: poses, scans, and truth."""
     with Recording(walk) as source:
         adc, times, truth = source.adc(0, 60), source.times[:60], source.read("truth/velocity")[:60]
     streams = {"truth/velocity": Stream((6,), "f8", "m/s", "", "radar/time")}
@@ -209,7 +210,7 @@ def test_every_second_frame_is_a_radar_of_half_the_rate(walk, tmp_path):
 
 
 def test_silence_is_survived(tmp_path):
-    """All samples zero (a radar that was never started): no crash, no motion, and a sentence."""
+    """All samples are zero (a radar that was not started): no crash, no motion, and one sentence."""
     config = PRESETS["radarize"]
     silence, times = np.zeros((20, *config.frame_shape), np.int16), np.arange(20) / 30
     results, _, preprocessor = follow(silence, times)
@@ -233,7 +234,7 @@ def test_unknown_methods(walk, tmp_path, arguments, words):
 
 
 def test_an_array_without_elevation(tmp_path):
-    """Two transmitters see no elevation: asking for it is refused in a sentence, and first-echo runs."""
+    """Two transmitters measure no elevation: requesting it is refused in one sentence, and first-echo runs."""
     config = RadarConfig(**{**PRESETS["radarize"].model_dump(), "tx_order": (0, 2)})
     rng = np.random.default_rng(0)
     with RecordingWriter(tmp_path / "flat.h5", config) as writer:
@@ -244,7 +245,7 @@ def test_an_array_without_elevation(tmp_path):
 
 
 def test_a_configuration_changes_the_run(walk, finished, tmp_path):
-    """What is set is used, and told; what is not set is as always."""
+    """Given settings are used and stored; the others keep their defaults."""
     (tmp_path / "mine.yaml").write_text("slam:\n  grid:\n    map_resolution: 0.1\nscans:\n  min_range: 2.0\n")
     mine = Configuration.load(tmp_path / "mine.yaml")
     out = tmp_path / "run"
@@ -252,9 +253,9 @@ def test_a_configuration_changes_the_run(walk, finished, tmp_path):
     with pytest.raises(SystemExit) as ended:
         command(app, "radarize", ["run", str(walk), "-o", str(out), *methods, "--config", str(tmp_path / "mine.yaml")])
     assert ended.value.code == 0
-    told = json.loads((out / "run.json").read_text())["configuration"]
-    assert told == json.loads(mine.model_dump_json())
-    assert told["slam"]["grid"]["map_resolution"] == 0.1 and told["scans"]["min_range"] == 2.0
+    stored = json.loads((out / "run.json").read_text())["configuration"]
+    assert stored == json.loads(mine.model_dump_json())
+    assert stored["slam"]["grid"]["map_resolution"] == 0.1 and stored["scans"]["min_range"] == 2.0
     usual = json.loads((finished / "run.json").read_text())["configuration"]
     assert usual == json.loads(Configuration().model_dump_json()) and usual["slam"]["grid"]["map_resolution"] != 0.1
     assert "resolution: 0.1\n" in (out / "map.yaml").read_text()

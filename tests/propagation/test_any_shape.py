@@ -1,4 +1,4 @@
-"""Whatever shape stands in a scene, however thin and however turned, is covered by plates and can be simulated."""
+"""Meshes of any shape and orientation, thin ones included, are covered by plates and can be simulated."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ bodies = st.one_of(
 
 
 def flat_area(mesh):
-    """Of all regions that are neither curved nor below a wavelength's square, m^2."""
+    """Area of all regions that are neither curved nor below a squared wavelength, m^2."""
     _, is_round = recognise(mesh)
     _, is_curved = pieces(mesh, ~is_round, SMALLEST)
     if (is_round | is_curved).all():
@@ -46,7 +46,7 @@ def flat_area(mesh):
 
 
 def area(corners):
-    """Of quadrilaterals, m^2: half the cross product of the diagonals."""
+    """Areas of quadrilaterals, m^2: half the cross product of the diagonals."""
     return np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1).sum() / 2
 
 
@@ -56,7 +56,7 @@ def area(corners):
 @example(shapes.cylinder((0, 0, 0), 0.005, 0.7, 48), (3.9, -34.4, -18.8), "metal")
 @example(shapes.cylinder((0, 0, 0), 0.4032, 0.0274, 57), (-93.9, 74.6, -115.6), "metal")
 def test_any_shape_is_covered_and_found(mesh, rotation, material):
-    """Plates cover 99 % of what is flat and nothing else, and a frame of finite echoes comes from it."""
+    """Plates cover 99 % of the flat area and nothing else, and a frame has finite echoes."""
     mesh = shapes.placed(mesh, (2, 0, 1), np.deg2rad(rotation))
     scene = Scene("one", [SceneObject("body", mesh, MATERIALS[material]), FLOOR])
     reflectors = Reflectors.of(scene, CONFIG)

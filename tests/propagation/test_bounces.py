@@ -1,4 +1,4 @@
-"""Echoes by mirrors alone, against rays shot into the office: which corners are there, and how strong."""
+"""Echoes over mirrors only, against rays shot into the office: existence and strength of corner reflections."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def office():
-    """The office with one more cabinet and without frames, all of metal, and what reflects in it."""
+    """The office with an additional cabinet and without door frames, all of metal, and its reflectors."""
     cabinet = SceneObject(
         "one more", span((8.7123, 6.458, 0.0), (9.7123, 6.98, 1.6), ("-z",)), MATERIALS["metal"], True
     )
@@ -39,7 +39,7 @@ def office():
 
 
 def by_chains(office, position, axis, spread, bounces):
-    """Amplitude of all chains of so many mirrors that leave within a fan, weighted as its rays are."""
+    """Amplitude of all chains of a number of mirrors within a fan, weighted like its rays."""
     scene, reflectors = office
     level = axis * [1, 1, 0] / np.hypot(axis[0], axis[1])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
@@ -64,7 +64,7 @@ HERE, THERE = np.array([8.3705, 5.6786, 1.1985]), np.array([10.4405, 6.1516, 1.1
     ],
 )
 def test_corners_that_there_are(office, position, target, bounces):
-    """Within 1.5 dB of physical optics on the last surface that rays meet."""
+    """Corner reflections are within 1.5 dB of physical optics on the last surface that rays meet."""
     axis = (np.array(target) - position) / np.linalg.norm(np.array(target) - position)
     truth = bounced(office[0], position, UP, axis, 0.2, bounces, LAMBDA)
     found = by_chains(office, position, axis, 0.2, bounces)

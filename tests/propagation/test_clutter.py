@@ -1,4 +1,4 @@
-"""Small things as points: how many, how strong, and that they are of the world."""
+"""Clutter points: number, strength, and that they are fixed in the world."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ SIDE = 60.0
 
 
 def lone(kind, level):
-    """A square of 60 m, high over the lowest point of the scene as its kind asks."""
+    """Square of 60 m, at the height above the scene's lowest point that its kind requires."""
     center, facing_, material, _ = KINDS[kind]
     objects = [
         SceneObject("square", shapes.rectangle(center, (SIDE, SIDE), facing_), MATERIALS[material]),
@@ -79,8 +79,8 @@ def sphere(steps=45):
 
 
 def scattered(points, normal, source):
-    """Share of what falls from `source` on the square that its points scatter: their bistatic cross sections over 4 pi,
-    integrated over the sphere. All have one pattern but for their size."""
+    """Fraction of the power from `source` on the square that its points scatter: their bistatic cross sections over 4
+    pi, integrated over the sphere. All points have the same pattern up to a factor."""
     for column in (points.normal, points.lobe, points.two_sided):
         assert np.all(column == column[0])
     face, lobe, two_sided = points.normal[0], points.lobe[0], points.two_sided[0]
@@ -101,7 +101,8 @@ def everything(found):
 
 
 def test_densities_by_what_things_are_on():
-    """Counts are Poisson's about density times area, with the level; each near its surface, on its outside."""
+    """Numbers are Poisson-distributed about density times area and level; each point is near its surface, on its
+    outside."""
     z = np.concatenate([everything(clutter(room(2.0), seed)).position for seed in range(40)])
     ranges = {
         "floor": ((z[:, 2] < 0.4) & (z[:, 0] < 11.6), ON_FLOORS * 116),
@@ -119,7 +120,8 @@ def test_densities_by_what_things_are_on():
 
 @pytest.mark.parametrize("level", [0.5, 5.0])
 def test_cross_sections_are_weibulls(level):
-    """Their law, and so the power a square metre of wall sends back: density times mean, less what is in shadow."""
+    """Distribution of cross sections, and the mean power per square metre of wall: density times mean, less
+    shadowing."""
     sigma = np.concatenate([everything(clutter(lone("wall", level), seed)).sigma for seed in range(3)])
     share = level * (STRUCTURE + ON_WALLS * CROSS_SECTION / 4)
     mean = CROSS_SECTION * (1 - np.exp(-share)) / share
@@ -137,7 +139,7 @@ def test_those_seen_over_mirrors_have_the_power_of_all():
 
 
 def test_same_things_from_everywhere():
-    """They belong to the world and its seed, not to who looks."""
+    """Points depend on the world and its seed, not on the sensor's position."""
     one = clutter(room())
     here, there = (one.near(np.array([[x, 0.0, 1.0]]), 4.0) for x in (5.0, 6.0))
     rows = [set(map(tuple, np.column_stack([s.position, s.sigma, s.phase]))) for s in (here, there)]
@@ -150,7 +152,7 @@ def test_same_things_from_everywhere():
 
 
 def test_coherent_under_motion():
-    """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
+    """An echo's phase changes by 2k times the motion towards its point in any direction, without new random numbers."""
     found = PathFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
     step = np.array([0.004, -0.003, 0.002])
     start = np.array([3.0, 0.5, 1.0])
@@ -184,8 +186,8 @@ def test_hidden_things_are_not_seen():
     assert everything(things).position[:, 0].max() > 3.5
 
 
-def test_none_at_level_nought():
-    """A scene of level 0 has the scatterers of its surfaces, drawn as without clutter."""
+def test_none_at_level_zero():
+    """A scene of level 0 has only the scatterers of its surfaces, the same as without clutter."""
     scene = room(0.0)
     rng = np.random.default_rng(0)
     both = Cluttered(Surface(scene, rng), Clutter(scene, rng), Detours.of(scene, CONFIG, rng))
@@ -205,8 +207,8 @@ def test_more_than_memory_holds():
 @pytest.mark.parametrize("level", [0, 0.5, 1, 3])
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_surface_gives_more_than_falls_on_it(kind, level):
-    """What the mirror reflects, the rough surface, structure and the things on it scatter, and passes, from head-on to
-    80 deg."""
+    """Specular, diffuse and transmitted power, and that scattered by structure and objects, together do not exceed the
+    incident power, from normal incidence to 80 deg."""
     of_things = KINDS[kind][3] * CROSS_SECTION / 4
     center, normal = (np.array(x, float) for x in KINDS[kind][:2])
     scene, bare = lone(kind, level), lone(kind, 0)
@@ -230,7 +232,7 @@ def test_no_surface_gives_more_than_falls_on_it(kind, level):
         shares.append(small)
         by_structure = small * STRUCTURE / of_things
         assert np.mean(np.abs(gamma_) ** 2) + diffuse + small + by_structure + passed <= 1
-        # what is scattered is taken from the mirror, the rough surface and what passes alike
+        # scattered power is taken in equal parts from specular, diffuse and transmitted power
         taken = 1 - np.mean(np.abs(gamma_) ** 2) / np.mean(np.abs(np.array(mirror(plain.layer[0], np.cos(angle)))) ** 2)
         expected = taken * of_things / (of_things + STRUCTURE)
         assert small == pytest.approx(expected, rel=4 * spread / np.sqrt(max(len(things), 1)))
@@ -239,7 +241,7 @@ def test_no_surface_gives_more_than_falls_on_it(kind, level):
 
 @pytest.mark.parametrize(("kind", "decibel"), [("wall", -1.2), ("desk", -1.2), ("floor", -1.1), ("ceiling", -1.1)])
 def test_mean_return_at_45_degrees(kind, decibel):
-    """At level 1 a square metre returns 0.005 m^2 a thing at 45 deg, less what stands in the shadow of others."""
+    """At level 1 each object of a square metre returns 0.005 m^2 at 45 deg on average, less the shadowing by others."""
     things = everything(clutter(lone(kind, 1.0), 3))
     cosine = np.cos(np.pi / 4)
     returned = np.sum(things.sigma * scattering(cosine, cosine, 1.0, things.lobe[0])) / SIDE**2

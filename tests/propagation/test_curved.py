@@ -41,7 +41,7 @@ def cross_section(amplitude, distance):
 @pytest.mark.parametrize(("radius", "subdivisions"), [(0.02, 2), (0.05, 3), (0.1, 3), (0.1, 4)])
 @pytest.mark.parametrize("bearing", [(1, 0, 0), (0.6, 0.64, 0.48), (0.3, -0.2, 0.93)])
 def test_sphere(radius, subdivisions, bearing):
-    """pi a^2 from anywhere, within 1 dB (the point that echoes is nearer than the centre by a)."""
+    """pi a^2 from any direction, within 1 dB (the specular point is nearer than the centre by a)."""
     amplitude = field(shapes.sphere((0, 0, 0), radius, subdivisions), -3.0 * np.array(bearing))
     assert 10 * np.log10(cross_section(amplitude, 3.0) / (np.pi * radius**2)) == pytest.approx(0, abs=1)
 
@@ -86,7 +86,7 @@ def test_cylinder_anywhere(radius, half, position):
 
 
 def test_range_and_doppler_of_a_passing_sphere():
-    """Range to the nearest point and closing speed to the centre, whichever way the radar moves."""
+    """Range to the nearest point and closing speed to the centre, for any motion of the radar."""
     radius, center = 0.1, np.array([3.0, 0.5, 0.0])
     scene = scene_of(shapes.sphere(center, radius))
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
@@ -109,7 +109,7 @@ HALF = (CONFIG.chirp_times.max() - CONFIG.chirp_times.min()) / 2
 
 
 def shortest(place, one, two):
-    """Of ways between two places over the points of a surface, by two parameters from nought on, m."""
+    """Shortest of the paths between two places over a surface given by two parameters from zero on, m."""
 
     def way(x):
         point = place(x)
@@ -122,7 +122,7 @@ def shortest(place, one, two):
 @pytest.mark.parametrize("gap", [0.2, 0.3, 0.5])
 @pytest.mark.parametrize("kind", ["sphere", "pole", "disc's end"])
 def test_phase_close_by(kind, gap, speed):
-    """Within 1 deg of the shortest way over the body, for every antenna, at rest and passing by at 1 m/s."""
+    """Within 1 deg of the shortest path over the body, for every antenna, at rest and passing by at 1 m/s."""
     radius, half = 0.1, 0.6
     center = np.array([gap + radius, 0.02, 0.01 if kind != "disc's end" else half + 0.05])
     if kind == "sphere":
@@ -152,15 +152,15 @@ def test_phase_close_by(kind, gap, speed):
 
 
 def test_what_is_round():
-    """Prisms of few sides, half pipes and ellipsoids are not; round bodies among others are."""
+    """Round bodies are recognised among others; prisms of few sides, half pipes and ellipsoids are not."""
     box, prism = shapes.box((0, 0, 0), (1, 1, 1)), shapes.cylinder((0, 0, 0), 0.1, 1, 6)
     ball = shapes.sphere((0, 0, 0), 0.1)
     egg = ball.copy()
     egg.vertices[:, 2] *= 1.2
     for mesh in (box, prism, egg):
         assert not recognise(mesh)[0]
-    legs = [shapes.placed(shapes.cylinder((x, 0, 0), 0.03, 0.7, 10), rotation=(0.3, 0.2, 0)) for x in (0, 1)]
-    bodies, taken = recognise(shapes.joined(*legs, shapes.placed(ball, (0, 3, 0)), shapes.placed(box, (5, 0, 0))))
+    poles = [shapes.placed(shapes.cylinder((x, 0, 0), 0.03, 0.7, 10), rotation=(0.3, 0.2, 0)) for x in (0, 1)]
+    bodies, taken = recognise(shapes.joined(*poles, shapes.placed(ball, (0, 3, 0)), shapes.placed(box, (5, 0, 0))))
     assert sorted(round(b.radius, 6) for b in bodies) == [0.03, 0.03, 0.1]
     assert taken.sum() == 2 * 20 + len(ball.faces)
     assert max(b.half for b in bodies) == pytest.approx(0.35)

@@ -1,4 +1,4 @@
-"""Doors that move echo like doors that stand: flash, mirror, let through; and what moves with them moves in phase."""
+"""Moving doors reflect, mirror and transmit like static doors, and paths over them move with the right phase."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ HERE, AHEAD = np.zeros(3), np.eye(3)
 
 
 def standing(angle, material="wood"):
-    """The same leaf as a thing that stands."""
+    """The same leaf as a static object."""
     turn = np.deg2rad(angle)
     center = HINGE + WIDTH / 2 * np.array([np.cos(turn), np.sin(turn), 0])
     leaf = shapes.placed(shapes.box((0, 0, 0), (WIDTH, THICKNESS, HEIGHT)), center, (0, 0, turn))
@@ -47,14 +47,14 @@ def standing(angle, material="wood"):
 
 
 def both(angle, things=(), surface=NOTHING, material="wood"):
-    """Echoes of a door that stands, and of one that moves but not now."""
+    """Echoes of a static door, and of a moving one at the same position."""
     stands = finder([standing(angle, material), *things], surface=surface)
     moves = finder(things, [door(angle, material)], surface)
     return stands(HERE, AHEAD), moves(HERE, AHEAD)
 
 
 def same(found, truth):
-    """Whether two lots of echoes are as strong, in phase and in number."""
+    """Whether two sets of echoes are equal in strength, phase and number."""
     order = [np.lexsort((e.amplitude.imag.round(9), e.amplitude.real.round(9))) for e in (found, truth)]
     size = np.abs(truth.amplitude).max()
     return len(found) == len(truth) and np.allclose(
@@ -63,7 +63,7 @@ def same(found, truth):
 
 
 @pytest.mark.parametrize("angle", [90.0, 91.5, 84.0, 60.0, 20.0])
-def test_a_door_flashes_as_if_it_stood(angle):
+def test_a_door_reflects_as_if_it_stood(angle):
     """Faces, edges and corners: the same field, power and phase, at any angle."""
     stands, moves = both(angle)
     truth, found = (field(e, HERE, LAMBDA) for e in (stands, moves))
@@ -74,7 +74,7 @@ def test_a_door_flashes_as_if_it_stood(angle):
 
 @pytest.mark.parametrize("angle", [90.0, 70.0, 45.0, 10.0])
 def test_a_door_scatters_no_more_than_if_it_stood(angle):
-    """Mean power of what is not a flash."""
+    """Mean power of diffuse echoes."""
     scene = Scene("door", [standing(angle)])
     powers = []
     for seed in range(4):
@@ -92,7 +92,7 @@ WALL = SceneObject("wall", shapes.rectangle((4.0, 0.0, 0), (6.0, 3.0), (-1, 0, 0
 
 @pytest.mark.parametrize(("angle", "material"), [(90.0, "wood"), (75.0, "wood"), (90.0, "glass"), (0.0, "wood")])
 def test_what_is_behind_a_door(angle, material):
-    """A point and a wall: weakened and delayed as by a slab that stands; beside an open door, they are as they were."""
+    """A point and a wall: attenuated and delayed as by a static slab; unchanged beside an open door."""
     point = Scatterers.points(np.array([[3.0, 0.1, 0.2]]), np.ones(1))
     stands, moves = both(angle, [WALL], point, material)
     truth, found = (e.where(through=bool(angle), bounces=0, moving=False) for e in (stands, moves))
@@ -111,7 +111,7 @@ SIDE = SceneObject("side", shapes.rectangle((1.5, 1.5, 0), (6.0, 3.0), (0, -1, 0
 
 
 def test_a_lamp_is_seen_over_a_door():
-    """Over its face on one way and on both: as over one that stands."""
+    """Over its face on one path and on both: as over a static door."""
     stands, moves = both(60.0, [LAMP])
     truth = [stands.where(bounces=n, through=False) for n in (1, 2)]
     assert [len(e.points) for e in truth] == [2, 1]
@@ -123,7 +123,7 @@ def test_a_lamp_is_seen_over_a_door():
 
 
 def test_chains_over_a_door():
-    """A door at an angle to a metal wall: the same images of the radar."""
+    """A door at an angle to a metal wall: the same images of the radar as over a static door."""
     stands, moves = both(50.0, [SIDE])
     ghosts = stands.where(bounces=2, through=False, moving=False)
     assert len(ghosts)
@@ -133,7 +133,7 @@ def test_chains_over_a_door():
 
 
 def reflection(mover, t):
-    """That in the face of a door that is turned to the origin: matrix and offset."""
+    """Reflection in the face of a door turned to the origin: matrix and offset."""
     low, high = np.deg2rad(mover.angles)
     angle = (low + high) / 2 - (high - low) / 2 * np.cos(2 * np.pi * t / mover.period)
     normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
@@ -144,12 +144,13 @@ def reflection(mover, t):
 TX, RX = tx_positions(CONFIG), rx_positions(CONFIG)
 
 
-def test_a_flash_moves_as_the_door_does():
-    """Its path, antenna by antenna, at the burst's ends and in its middle; its speed is that of the foot, twice."""
+def test_its_reflection_moves_as_the_door_does():
+    """Path length of every antenna at the burst's ends and centre; its rate is twice the speed of the specular
+    point."""
     mover = swinging(90.0)
     echoes = finder([], [mover])(HERE, AHEAD, MIDDLE)
-    flash = np.abs(echoes.amplitude).argmax()
-    found = lengths(echoes)[flash]
+    strongest = np.abs(echoes.amplitude).argmax()
+    found = lengths(echoes)[strongest]
     late = lag(as_slab(standing(90.0))[0], CONFIG)
     assert abs(late) > 1e-4
     for k, s in enumerate(INSTANTS):
@@ -180,7 +181,7 @@ def test_corners_with_a_door_move_as_it_does():
 
 
 def test_points_move_over_a_door():
-    """A point that stands, seen over a door on one way and on both, through the whole burst."""
+    """A static point, seen over a door on one path and on both, over the whole burst."""
     mover, place = swinging(60.0), np.array([1.2, 1.3, 0.1])
     echoes = finder([], [mover], Scatterers.points(place[None], np.ones(1)))(HERE, AHEAD, MIDDLE)
     points, n = echoes.where(kind=Kind.POINT), len(echoes.points)
@@ -198,7 +199,8 @@ def test_points_move_over_a_door():
 
 
 def test_ghosts_of_a_lamp_move_with_the_door():
-    """The shortest way over the sphere between radar and image; its point wanders, which is of second order."""
+    """Shortest path over the sphere between radar and image; the motion of its specular point is a second-order
+    effect."""
     mover, center, radius = swinging(60.0), np.array([1.2, 1.3, 0.1]), 0.1
     echoes = finder([LAMP], [mover])(HERE, AHEAD, MIDDLE)
     echoes = echoes.where(kind=Kind.POINT)

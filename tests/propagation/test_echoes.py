@@ -1,4 +1,4 @@
-"""Which echoes a scene has: ghosts where the image method puts them, reciprocity, visibility, coherent speckle."""
+"""Echoes of a scene: ghosts where the image method puts them, reciprocity, visibility, coherent speckle."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ WALL = {"shape": "rectangle", "name": "wall", "material": "metal", "size": [8, 3
 
 @pytest.fixture(scope="module")
 def corner(tmp_path_factory):
-    """A metal wall 1.5 m to the left, along the way ahead, and a wooden board 3.5 m off to the right behind a box."""
+    """A metal wall 1.5 m to the left, along the radar's course, and a wooden board 3.5 m to the right behind a box."""
     path = tmp_path_factory.mktemp("scene") / "corner.yaml"
     board = {"shape": "rectangle", "name": "board", "material": "wood", "size": [1, 1], "position": [3.5, -1.2, 0],
              "facing": [-1, 0, 0]}  # fmt: skip
@@ -38,14 +38,15 @@ def finder_with_one_target(scene, place, weakest=0.0):
 
 
 def test_ghosts_stand_where_the_image_method_puts_them(corner):
-    """A target in front of a wall has one image, reached out on one leg and back on the other, both ways round."""
+    """A target in front of a wall has one image, with one path segment direct and the other over the wall, and vice
+    versa."""
     place = np.array([2.2, 0.4, 0.1])
     echoes = finder_with_one_target(corner, place)(HERE, AHEAD).where(bounces=1)
     image = place * [1, -1, 1] + [0, 3.0, 0]
     assert len(echoes) == 2
     assert echoes.points[0] == pytest.approx(np.stack([place, image]))
     assert echoes.points[1] == pytest.approx(np.stack([image, place]))
-    # radar equation with both legs, a conductor's coefficient and the antenna's gain in both directions
+    # radar equation with both path segments, a conductor's coefficient and the antenna's gain in both directions
     out, back = np.linalg.norm(place), np.linalg.norm(image)
     isotropic = CONFIG.wavelength / (4 * np.pi) ** 1.5 / (out * back)
     gain = amplitude_gain(*place, ELEMENT) * amplitude_gain(*image, ELEMENT)
@@ -54,7 +55,7 @@ def test_ghosts_stand_where_the_image_method_puts_them(corner):
 
 
 def test_no_ghost_where_the_bounce_misses_the_mirror():
-    """A wall that ends before the specular point: the target is seen, its ghost is not."""
+    """A wall that ends before the specular point: the target has an echo, but no ghost."""
     short = dict(WALL, size=[1, 3], position=[-2, 1.5, 0])
     mesh = rectangle(tuple(short["position"]), tuple(short["size"]), tuple(short["facing"]))
     scene = Scene("short", [SceneObject("wall", mesh, MATERIALS["metal"])])
@@ -63,7 +64,8 @@ def test_no_ghost_where_the_bounce_misses_the_mirror():
 
 
 def test_polarisation_of_the_bounce(corner):
-    """Upright fields on an upright wall are TE (a conductor turns the sign), on a conducting floor TM (it does not)."""
+    """A vertical field on a vertical wall is TE (a conductor inverts the sign), on a conducting floor TM (it does
+    not)."""
     wall_ghost = finder_with_one_target(corner, np.array([2.2, 0.4, 0.0]))(HERE, AHEAD).where(
         bounces=1, through=False, moving=False
     )
@@ -76,7 +78,7 @@ def test_polarisation_of_the_bounce(corner):
 
 
 def test_the_hidden_are_not_seen(corner):
-    """Scatterers of the board behind the box give no direct echo; those beside the box do."""
+    """Scatterers of the board behind the box have no direct echo; those beside the box do."""
     scatterers = Surface(corner, np.random.default_rng(0), density=400.0).all()
     echoes = PathFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
     seen = echoes.points[:, 0]
@@ -91,7 +93,7 @@ def test_the_hidden_are_not_seen(corner):
 
 
 def test_reciprocity(corner):
-    """Swapping the legs of every echo, that is TX and RX, leaves the set of echoes as it was."""
+    """Swapping the paths of every echo, that is TX and RX, leaves the set of echoes as it was."""
     scatterers = Surface(corner, np.random.default_rng(1), density=100.0).all()
     echoes = PathFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
     assert len(echoes.where(bounces=1)) > 50
@@ -101,7 +103,7 @@ def test_reciprocity(corner):
 
 
 def test_speckle_is_the_same_world_from_elsewhere(corner):
-    """After a shift of d the field equals that of the same frozen scatterers: nothing is drawn anew."""
+    """After a shift of d the field equals that of the same frozen scatterers: none are drawn again."""
     scatterers = Surface(corner, np.random.default_rng(2), density=150.0).all()
     finder = PathFinder(corner, scatterers, None, CONFIG)
     reference = finder(HERE, AHEAD)
@@ -119,7 +121,7 @@ def test_speckle_is_the_same_world_from_elsewhere(corner):
 
 
 def test_speckle_is_rayleigh():
-    """Kolmogorov-Smirnov."""
+    """Kolmogorov-Smirnov test of amplitudes against a Rayleigh distribution."""
     assert stats.kstest(speckle(60), stats.rayleigh.cdf).pvalue > 0.01
 
 
@@ -136,15 +138,15 @@ def test_power_does_not_depend_on_the_number_of_scatterers(corner):
     assert levels[1] - levels[0] == pytest.approx(0, abs=0.3)
 
 
-def test_wall_flash_survives_the_whole_chain(corner):
-    """The metal wall seen face on: lambda / (8 pi R) times the gain at boresight, at its range."""
+def test_wall_reflection_survives_the_whole_chain(corner):
+    """The metal wall at normal incidence: lambda / (8 pi R) times the gain at boresight, at its range."""
     facing = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # boresight towards +y
     scatterers = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     echoes = PathFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, facing)
-    flash = np.argmax(np.abs(echoes.amplitude))
+    strongest = np.argmax(np.abs(echoes.amplitude))
     gain = 10 ** (10.5 / 10)
     rough = np.exp(-8 * (np.pi * 2e-5 / CONFIG.wavelength) ** 2)
     expected = gain * rough * CONFIG.wavelength / (8 * np.pi * 1.5)
-    assert 20 * np.log10(abs(echoes.amplitude[flash]) / expected) == pytest.approx(0, abs=0.1)
+    assert 20 * np.log10(abs(echoes.amplitude[strongest]) / expected) == pytest.approx(0, abs=0.1)
     lengths = echoes.lengths(CONFIG, Rig(), 0.0)
-    assert lengths[flash, 0, 0] == pytest.approx(3.0, abs=1e-6)
+    assert lengths[strongest, 0, 0] == pytest.approx(3.0, abs=1e-6)

@@ -1,4 +1,4 @@
-"""What stands in the first Fresnel zones of a flash or a chain: Kirchhoff's integral, and no steps."""
+"""Obstacles in the first Fresnel zones of specular reflections and chains: Kirchhoff's integral, and no steps."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,8 @@ WEDGE = [
 
 
 def test_a_pole_before_a_wall():
-    """In steps of 6 mm over its zones, where one ray went from 0 to -106 dB."""
+    """A pole in front of a wall, in steps of 6 mm over its zones, in which a single ray would jump from 0 to -106
+    dB."""
     truth, found = wall_past_pole()
     middle = np.abs(OFFSETS) < 0.032
     assert truth[middle].max() < -2 and truth.min() > -4
@@ -45,7 +46,7 @@ def test_a_pole_however_it_leans(tilt):
 
 @pytest.mark.parametrize("offset", [0.0, 0.012, 0.024])
 def test_a_pole_within_a_chain(offset):
-    """Between the sides of a wedge, where the way is 2.5 m long if it is unfolded."""
+    """A pole between the sides of a wedge, on a path of 2.5 m when unfolded."""
     foot, normal = np.array([3.0, -0.5]), np.array([-RISE, -SLOPE])
     place = np.array([2.5, offset])
     x, y = place - 2 * np.dot(place - foot, normal) * normal
@@ -54,12 +55,12 @@ def test_a_pole_within_a_chain(offset):
 
 
 def board(x, y):
-    """A screen beside the way that leaves it clear up to y, m; negative: it hides the way."""
+    """A screen beside the path that leaves it clear up to y, m; negative: it blocks the path."""
     return SceneObject("board", shapes.rectangle((x, y + 0.5, 0), (1.0, 3.0), (-1, 0, 0)), MATERIALS["metal"])
 
 
 def test_half_a_plane_by_closed_forms():
-    """The reference itself: at grazing 1 / 4 + asin(rho) / (2 pi), where rho is 1 / 3 half way to the mirror."""
+    """Check of the reference: at grazing 1 / 4 + asin(rho) / (2 pi), where rho is 1 / 3 half way to the mirror."""
     grazing = past_edge(0.0, (1.0, 3.0), 4.0, LAMBDA)
     assert grazing == pytest.approx(0.25 + np.arcsin(1 / 3) / (2 * np.pi), abs=1e-6)
     wide = past_pole(0.22, 0.4, (1.0, 3.0), 4.0, LAMBDA, nodes=2000)  # a strip whose other edge is far
@@ -68,7 +69,7 @@ def test_half_a_plane_by_closed_forms():
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 1.5, 1.8])
 def test_the_shadow_of_an_edge(distance):
-    """A wall's flash, 2 m away, behind a screen at a distance: the way out and back meets two edges that are one."""
+    """A specular reflection 2 m away behind a screen: the path out and back passes two edges that coincide."""
     zone = np.sqrt(LAMBDA * distance * (4 - distance) / 8)
     offsets = np.array([-0.8, -0.5, -0.25, 0.0, 0.25, 0.5, 0.8]) * zone
     truth = [20 * np.log10(abs(past_edge(y, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
@@ -79,13 +80,13 @@ def test_the_shadow_of_an_edge(distance):
 
 @pytest.mark.parametrize("offset, level", [(0.0, -10.3), (-0.01, -14.1), (-0.03, -21.0)])
 def test_an_edge_half_way(offset, level):
-    """At the way, 10 and 30 mm into the shadow: 1.7 to 3.8 dB more than two edges of which each is alone."""
+    """An edge on the path, 10 and 30 mm into the shadow: 1.7 to 3.8 dB more than two independent edges."""
     assert 20 * np.log10(abs(past_edge(offset, (1.0, 3.0), 4.0, LAMBDA))) == pytest.approx(level, abs=0.1)
     assert left([WALL], [board(1.0, offset)], 4.0) == pytest.approx(level, abs=1.5)
 
 
-def test_an_edge_that_covers_the_flash_bit_by_bit():
-    """Half a plane at 1 m, from 50 mm beside the way to 50 mm over it: no step on either side."""
+def test_an_edge_that_covers_the_reflection_bit_by_bit():
+    """Half a plane at 1 m, from 50 mm beside the path to 50 mm over it: no step on either side."""
     steps = np.arange(-10, 11) * 0.005
     found = np.array([left([WALL], [board(1.0, -y)], 4.0) for y in steps])
     assert np.interp(0.0, steps, found) == pytest.approx(-10.3, abs=1.5)
@@ -94,7 +95,7 @@ def test_an_edge_that_covers_the_flash_bit_by_bit():
 
 
 def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
-    """The edge of a plate beside which the radar passes, in steps of 3 mm: no step, as by one ray (0.53)."""
+    """The edge of a plate that the radar passes, in steps of 3 mm: no step, in contrast to a single ray (0.53)."""
     plate = SceneObject("plate", shapes.rectangle((2, -0.5, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     reflectors, scene = Reflectors.of(Scene("plate", [plate]), CONFIG), Scene("all", [plate, board(1.0, 0.15)])
@@ -108,7 +109,7 @@ def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
 
 
 def test_a_border_passes_without_steps():
-    """The edge of a screen, half a millimetre at a time; where nodes were clear or not, 0.06 of the amplitude."""
+    """The edge of a screen, half a millimetre at a time; binary nodes would step by 0.06 of the amplitude."""
     offsets = np.arange(-0.02, 0.02, 0.0005)
     found = 10 ** (np.array([left([WALL], [board(1.0, y)], 4.0) for y in offsets]) / 20)
     truth = np.array([abs(past_edge(y, (1.0, 3.0), 4.0, LAMBDA)) for y in offsets])
@@ -117,8 +118,8 @@ def test_a_border_passes_without_steps():
 
 
 def test_a_strip_goes_behind_an_edge_as_a_point_does():
-    """A strip of 20 mm, half a zone wide: what passes on the way there passes on the way back, Fresnel's integral
-    squared (by one ray, 0 or 1)."""
+    """A strip of 20 mm, half a zone wide: the factor of the path there applies on the path back as well, Fresnel's
+    integral squared (for one ray, 0 or 1)."""
     strip = SceneObject("strip", shapes.rectangle((2, 0, 0), (0.02, 0.4), (-1, 0, 0)), MATERIALS["metal"])
     reflectors, nothing = (
         Reflectors.of(Scene("strip", [strip]), CONFIG),
@@ -139,7 +140,7 @@ def test_a_strip_goes_behind_an_edge_as_a_point_does():
 
 
 def test_the_echo_of_a_strip_moves_with_it():
-    """Paths found 5 mm aside keep what a strip of 20 mm echoes; by its edges, nearly opposite, 0.24 of it was lost."""
+    """Paths found 5 mm aside keep the echo of a strip of 20 mm; as nearly opposite edges it would lose 0.24."""
     strip = SceneObject("strip", shapes.rectangle((1.75, 0, 0), (0.02, 0.32), (-1, 0, 0)), MATERIALS["metal"])
     nothing, scene = Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Scene("strip", [strip])
     finder = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)

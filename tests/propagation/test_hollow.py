@@ -1,4 +1,5 @@
-"""Panes and hollow bodies over the sweep, against the transfer matrix: where a pane echoes, and where a rear leaf."""
+"""Panes and hollow bodies over the sweep, against the transfer matrix: positions of a pane's echo and of a rear
+leaf's."""
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from radarsim.world.objects import SceneObject
 
 @pytest.mark.parametrize("name", PANES)
 def test_where_a_pane_echoes(name):
-    """Between its faces, or before them where these nearly cancel: by up to 6 mm, taken at the centre of the sweep."""
+    """Between its faces, or in front of them by up to 6 mm where these nearly cancel, at the centre of the sweep."""
     (there, size), (place, level) = (peak(profile, -0.05, 0.05) for profile in pane(name))
     assert place == pytest.approx(there, abs=0.0015) and level == pytest.approx(size, abs=0.7)
 
@@ -25,7 +26,7 @@ def test_the_rear_leaf_of_a_stud_wall():
 
 
 def test_inner_faces_count_where_the_material_lets_through():
-    """Of a cabinet of chipboard; not of one of metal, nor of a solid wooden block."""
+    """A cabinet of chipboard has inner faces; one of metal, or a solid wooden block, has none."""
     far = {}
     for name in ("chipboard", "metal", "wood"):
         found = echoes(SceneObject("cabinet", shapes.box((NEAR + 0.2, 0, 0), (0.4, 2, 2)), MATERIALS[name]))

@@ -34,7 +34,8 @@ LAMBDA = CONFIG.wavelength
 @pytest.mark.parametrize("off", [-20, -10, 0, 7, 20])
 @pytest.mark.parametrize(("a", "b"), [(0.03, 0.03), (0.04, 0.02)])
 def test_dihedral(off, a, b):
-    """sigma = 8 pi a^2 b^2 / lambda^2 head on; off it, by the width that both plates share, 2 a min(sin, cos)."""
+    """sigma = 8 pi a^2 b^2 / lambda^2 at normal incidence; off it, by the width that both plates share, 2 a min(sin,
+    cos)."""
     azimuth = np.deg2rad(45 + off)
     area = seen_by_both(a, b, azimuth)
     found = cross_section(corner(2, a, b), direction(azimuth, 0))
@@ -44,7 +45,8 @@ def test_dihedral(off, a, b):
 
 
 def test_dihedral_turns_polarisation():
-    """Rolled by 45 deg against its edge, a dihedral sends everything back crosswise; by 90 deg, nothing is lost."""
+    """Rolled by 45 deg about boresight, a dihedral returns only the crossed polarisation; by 90 deg, nothing is
+    lost."""
     mirrors, ahead = corner(2, 0.03, 0.03), direction(np.pi / 4, 0)
     level = cross_section(mirrors, ahead)
     assert cross_section(mirrors, ahead, roll=np.pi / 4) < 1e-4 * level
@@ -71,7 +73,7 @@ def test_square_trihedral():
 
 
 def test_wide_corner_is_the_image_in_its_edge():
-    """From near, a corner of two walls echoes as one endless mirror at the edge would: lambda / (4 pi 2 R)."""
+    """At short range a corner of two walls equals one infinite mirror at the edge: lambda / (4 pi 2 R)."""
     for azimuth in np.deg2rad([20, 45, 63]):
         found = cross_section(corner(2, 5.0, 3.0), direction(azimuth, 0.0), distance=2.0)
         expected = (LAMBDA / (8 * np.pi * 2)) ** 2 * (4 * np.pi) ** 3 * 2**4 / LAMBDA**2
@@ -79,7 +81,7 @@ def test_wide_corner_is_the_image_in_its_edge():
 
 
 def test_no_step_as_the_image_leaves_the_corner():
-    """Sliding past the end of a dihedral's edge in tenths of a millimetre, the echo never jumps."""
+    """Moving past the end of a dihedral's edge in tenths of a millimetre, the echo is continuous."""
     mirrors = corner(2, 1.0, 1.0)
     values = []
     for z in 0.5 + np.arange(-100, 100) * 1e-3:
@@ -92,7 +94,7 @@ def test_no_step_as_the_image_leaves_the_corner():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_kirchhoff_integral(seed):
-    """The sum over edges is the integral over the polygon, wherever the path passes it."""
+    """The sum over edges equals the integral over the polygon, wherever the path passes it."""
     rng = np.random.default_rng(seed)
     angles = np.sort(rng.uniform(0, 2 * np.pi, 5))
     polygon = rng.uniform(0.3, 2.5) * np.stack([np.cos(angles), np.sin(angles)], 1) + rng.uniform(-1.5, 1.5, 2)
@@ -108,7 +110,7 @@ def test_kirchhoff_integral(seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_what_an_edge_diffracts(seed):
-    """The tabulated integral along an edge is the integral itself, near the path and away from it; it is odd."""
+    """The tabulated integral along an edge equals the integral itself, near the path and away from it; it is odd."""
     rng = np.random.default_rng(seed)
     s, ends = rng.uniform(0, apertures.FADE) * 10.0 ** rng.uniform(-4, 0), rng.uniform(-1, 1, 2) * apertures.FADE
     low, high = np.sort(ends)
@@ -155,7 +157,7 @@ def test_box_room_has_all_its_images(monkeypatch):
 
 
 def test_ghosts_of_a_box_room():
-    """Edges and corners of a room echo from where they stand; images farther behind its walls than the radar can
+    """Echoes of a room's edges and corners are at their positions; images farther behind its walls than the radar can
     resolve are ghosts."""
     scene = Scene.load("physics/room")
     finder = PathFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
@@ -179,7 +181,7 @@ def test_ghosts_of_a_box_room():
 
 
 def test_images_fade_out_before_their_paths_get_too_long():
-    """Through the room in steps of 1 cm, images come and go at the longest path only where the IF filter has closed."""
+    """Through the room in steps of 1 cm, images appear at the longest path only where the IF filter has closed."""
     scene, front = Scene.load("physics/room"), FrontEnd(CONFIG)
     reach = front.settings.band.high * CONFIG.max_range
     mirrors, ahead = Reflectors.of(scene, CONFIG).flat, looking(direction(0.4, 0.1))

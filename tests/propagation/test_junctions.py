@@ -1,4 +1,4 @@
-"""Where walls, floors and boxes meet: a mirror that runs on behind another returns what the bare corner does."""
+"""Junctions of walls, floors and boxes: a mirror that extends behind another returns the same as the bare corner."""
 
 import numpy as np
 import pytest
@@ -61,8 +61,8 @@ def echo(objects, position, target, isometry):
 
 
 def check(objects, position, target, isometry):
-    """Within 0.3 dB and 3 deg of the image theory of perfect conductors at right angles: the radar's image by the
-    isometry alone, of either polarity."""
+    """Check within 0.3 dB and 3 deg against the image theory of perfect conductors at right angles: the radar's image
+    by the isometry alone, of either polarity."""
     found, slab = echo(objects, position, target, isometry)
     distance = np.linalg.norm(target - position)
     way = (target - position) / distance
@@ -95,13 +95,13 @@ BARE = (sheet("side", (0.5, 1, 1), (5, 4), (0, -1, 0)), sheet("end", (3, -1.5, 1
 @pytest.mark.parametrize("walls", [BARE, (SIDE, END, FLOOR), (SIDE_ON, END_ON, FLOOR_ON), (SIDE_BOX, END_BOX, SLAB)])
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (1.2, -0.6, 0.4)])
 def test_a_corner_of_three(walls, place):
-    """All six orders of a floor and two walls, which end where they meet or run on."""
+    """All six orders of a floor and two walls, which end at their junction or extend beyond it."""
     check(walls, np.array(place), np.array([3.0, 1.0, -1.0]), -np.eye(3))
 
 
 @pytest.mark.parametrize("a", [0.02, 0.04])
 def test_a_small_dihedral_whose_plate_runs_on(a):
-    """8 pi a^2 b^2 / lambda^2, though one plate is three times as wide, or both are."""
+    """8 pi a^2 b^2 / lambda^2, although one plate, or both, is three times as wide."""
     bare, towards = corners.corner(2, a, 0.03), corners.direction(np.pi / 4, 0)
     truth = 8 * np.pi * a**2 * 0.03**2 / LAMBDA**2
     for widened in ([], [0], [1], [0, 1]):
@@ -116,7 +116,7 @@ def test_a_small_dihedral_whose_plate_runs_on(a):
 @pytest.mark.parametrize("off", [-1.0, -0.3, 0.3, 1.0])
 @pytest.mark.parametrize("on", [0.0, 2.0])
 def test_walls_out_of_square_that_run_on(off, on):
-    """Two walls that meet at 90 deg and an angle: half a plane's diffraction, in either order of the walls."""
+    """Two walls at 90 deg plus an angle: half a plane's diffraction, in either order of the walls."""
     angle, distance = np.deg2rad(off), 3.0
     half, objects = np.pi / 4 + angle / 2, []
     for side, more in ((1, 0.0), (-1, on)):

@@ -1,4 +1,4 @@
-"""Each law of radar physics against its closed form."""
+"""Laws of radar physics against their closed forms."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_doppler_of_sensor_motion(velocity, azimuth):
 
 @pytest.mark.parametrize("rate", [-1.5, 1.5])
 def test_doppler_of_a_lever_arm(rate):
-    """Turning about a point 0.4 m behind the sensor moves it sideways at omega x r, left for a left turn."""
+    """Rotation about a point 0.4 m behind the sensor moves it sideways at omega x r, left for a left turn."""
     rig = Rig(yaw_rate=rate, yaw=-rate * CONFIG.burst_center, lever=(0.4, 0, 0))
     place = np.array([0.4, 0, 0]) + polar(3.0, 40)
     finder = PathFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
@@ -95,7 +95,7 @@ def test_range_doppler_coupling():
 
 
 def test_noise_floor_is_ktbf():
-    """Noise alone: k T B F at the input, times gain, in counts; white over the flat part of the band."""
+    """Noise only: k T B F at the input, times gain, in counts; white over the flat part of the band."""
     front = FrontEnd(CONFIG, FrontEndConfig.ideal(noise=True, band=Band()))
     silence = np.zeros((CONFIG.loops, 3, 4, CONFIG.samples), np.complex64)
     iq = front.digitize(silence, np.random.default_rng(3)).astype(float)

@@ -1,4 +1,4 @@
-"""Things that move: their scatterers, what they hide, and their echoes chirp by chirp."""
+"""Moving objects: their scatterers, occlusion by them, and their echoes chirp by chirp."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ WALKER = Person(name="walker", path=((0, 0), (10, 0)), speed=1.2)
 
 
 def test_scatterers_are_carried_along():
-    """A scatterer keeps its distance from every other of the same part."""
+    """A scatterer keeps its distance from all others of the same part."""
     crowd = MovingTargets([WALKER, Fan(name="f", center=(3, 1, 2))], np.random.default_rng(1))
     places = crowd.positions(np.array([0.3, 1.7]))
     for part in (0, 3, 10):
@@ -60,14 +60,15 @@ def test_occlusion_against_brute_force():
 
 
 def alone(movers, scene=None, surface=NOTHING, seed=0):
-    """A finder that sees movers, and the crowd that they are."""
+    """A finder with moving targets only, and these targets."""
     crowd = MovingTargets(movers, np.random.default_rng(seed), density=60.0)
     facets = None if scene is None else Reflectors.of(scene, CONFIG)
     return PathFinder(scene, surface, facets, CONFIG, moving=crowd), crowd
 
 
 def brute_force(echoes, crowd, time, which, mirror=None):
-    """The beat signal with every scatterer placed anew at every sample of every chirp; `which`: of each echo."""
+    """Beat signal with every scatterer at its exact position for every sample of every chirp; `which`: scatterer of
+    each echo."""
     loops, n_tx, n_rx, samples, _ = CONFIG.frame_shape
     on_ramp = (np.arange(samples) - (samples - 1) / 2) / CONFIG.sample_rate
     tx, rx = tx_positions(CONFIG), rx_positions(CONFIG)
@@ -78,12 +79,12 @@ def brute_force(echoes, crowd, time, which, mirror=None):
             share = np.linspace(0, 1, samples)[:, None, None]  # straight within the 42 us of a ramp
             place = (1 - share) * ends[0] + share * ends[1]
             for r in range(n_rx):
-                legs = []
+                segments = []
                 for way, antenna in enumerate((tx[k], rx[r])):
                     image = place * [1, -1, 1] + [0, 4, 0]
                     virtual = place if mirror is None else np.where(mirror[:, way, None], image, place)
-                    legs.append(np.linalg.norm(virtual - antenna, axis=2))
-                delay = (legs[0] + legs[1]) / SPEED_OF_LIGHT
+                    segments.append(np.linalg.norm(virtual - antenna, axis=2))
+                delay = (segments[0] + segments[1]) / SPEED_OF_LIGHT
                 phase = CONFIG.center_frequency * delay + CONFIG.slope * delay * (on_ramp[:, None] - delay / 2)
                 out[loop, k, r] = (echoes.amplitude * np.exp(2j * np.pi * phase)).sum(axis=1)
     return out
@@ -117,7 +118,7 @@ def test_phases_against_brute_force(mover, below):
 
 
 def test_ghosts_of_movers_move_as_mirrored():
-    """Over a metal wall 2 m to the left: the reflected leg follows the mirrored walker."""
+    """Over a metal wall 2 m to the left: the reflected path segment follows the mirrored walker."""
     wall = Scene("wall", [SceneObject("wall", rectangle((2, 2, 0), (8, 4), (0, -1, 0)), MATERIALS["metal"])])
     finder, crowd = alone([Person(name="p", path=((2, -0.5), (2, 1.0)), speed=1.3, floor=-1.0)], wall)
     time = 0.5
@@ -132,18 +133,18 @@ def test_ghosts_of_movers_move_as_mirrored():
 
 
 def test_an_approaching_person_closes():
-    """Somebody who walks towards the radar has positive closing speed, about their own."""
+    """A person who walks towards the radar has a positive closing speed, about the walking speed."""
     mover = Person(name="p", path=((4.0, 0), (0.5, 0)), speed=1.0, floor=-1.0)
     finder, _ = alone([mover])
     echoes = finder(np.zeros(3), np.eye(3), 1.0)
     lengths = echoes.lengths(CONFIG, Rig(), 1.0 - CONFIG.burst_center)
     closing = -lengths[:, 0, 1] / BurstClock.of(CONFIG).half / 2
     assert np.median(closing) == pytest.approx(1.0, abs=0.15)
-    assert np.ptp(closing) > 0.5  # arms and legs
+    assert np.ptp(closing) > 0.5  # swinging limbs
 
 
 def test_a_person_casts_a_shadow():
-    """Points behind a standing person fall silent; those beside do not."""
+    """Points behind a standing person have no echo; those beside do."""
     person = Person(name="p", path=((1.5, 0),), floor=-1.0)
     place = np.array([polar(3.0, azimuth) for azimuth in (-20, 0, 20)])
     finder, _ = alone([person], surface=Scatterers.points(place, np.ones(3)))
@@ -153,7 +154,7 @@ def test_a_person_casts_a_shadow():
 
 
 def test_cross_section_of_a_person():
-    """The echoes of a person add up to about the cross section that was asked for."""
+    """The echoes of a person add up to about the specified cross section."""
     person = Person(name="p", path=((3.0, 0),), floor=-1.0, cross_section=0.5)
     finder, _ = alone([person])
     echoes = finder(np.zeros(3), np.eye(3), 0.0)

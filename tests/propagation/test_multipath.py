@@ -1,4 +1,4 @@
-"""Legs over mirrors and through slabs: phantoms where the image method puts them, transmission, reciprocity."""
+"""Multipath over mirrors and through slabs: ghosts where the image method puts them, transmission, reciprocity."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def finder(objects, place, **options):
 
 
 def points_of(echoes, bounces):
-    """Point echoes of one cause, and their amplitudes."""
+    """Point echoes of one path type, and their amplitudes."""
     some = echoes.where(kind=Kind.POINT, bounces=bounces, through=False)
     return some.points, some.amplitude
 
@@ -56,7 +56,7 @@ AT_END = sheet("end", "metal", (3.0, 0, 0), (2.4, 2.4), (-1, 0, 0))
     ],
 )
 def test_phantom_in_the_heat_map(objects, place, phantom):
-    """Out and back over the same mirror: a phantom at the image, within one range bin and one degree."""
+    """Out and back over the same mirror: a ghost at the image, within one range bin and one degree."""
     echoes = finder(objects, place)(HERE, AHEAD).where(bounces=2, through=False, kind=Kind.POINT)
     seen = [k for k, p in enumerate(echoes.points) if np.allclose(p, phantom)]
     assert len(seen) == 1
@@ -72,7 +72,7 @@ def test_phantom_in_the_heat_map(objects, place, phantom):
 
 
 def test_all_phantoms_of_a_corner():
-    """Two walls at right angles: three images of a target, and every way to go out by one and back by another."""
+    """Two walls at right angles: three images of a target, and every combination of paths out and back."""
     place = np.array([2.4, 0.5, 0.0])
     left, end = place * [1, -1, 1] + [0, 2.4, 0], place * [-1, 1, 1] + [6.0, 0, 0]
     both = np.array([end[0], left[1], 0.0])
@@ -87,7 +87,7 @@ def test_all_phantoms_of_a_corner():
     for e in known:
         here = np.linalg.norm(places - e, axis=1) < 1e-6
         assert here.any()
-        # radar equation over both legs; conductors reflect all, so only antenna and distance count
+        # radar equation over both path segments; conductors reflect all power, so only antenna and distance count
         gain = [amplitude_gain(*q, ELEMENT) / np.linalg.norm(q) for q in (e[:3], e[3:])]
         truth = LAMBDA / (4 * np.pi) ** 1.5 * gain[0] * gain[1]
         assert 20 * np.log10(abs(amplitude[here].sum()) / truth) == pytest.approx(0, abs=0.2)
@@ -95,7 +95,7 @@ def test_all_phantoms_of_a_corner():
 
 
 def test_the_hidden_are_seen_over_mirrors():
-    """A target behind a metal board gives no direct echo, but one out and back over the wall."""
+    """A target behind a metal board has no direct echo, but one out and back over the wall."""
     board = SceneObject("board", box((1.2, 0, 0), (0.05, 0.6, 2.0)), MATERIALS["metal"])
     place = np.array([2.4, 0.0, 0.0])
     echoes = finder([LEFT, board], place)(HERE, AHEAD)
@@ -108,7 +108,8 @@ def test_the_hidden_are_seen_over_mirrors():
 @pytest.mark.parametrize("tm", [False, True])
 @pytest.mark.parametrize("material", ["glass", "plasterboard"])
 def test_pane_in_front_of_a_target(material, tm, angle):
-    """Loss and phase of a pane, passed twice, against the transfer matrix; turned upright it is TE, tipped over TM."""
+    """Loss and phase of a pane, passed twice, against the transfer matrix; rotated about the vertical it is TE, tilted
+    TM."""
     place, tilt = np.array([3.0, 0, 0]), np.deg2rad(angle)
     facing = (-np.cos(tilt), 0, np.sin(tilt)) if tm else (-np.cos(tilt), np.sin(tilt), 0)
     pane = sheet("pane", material, (1.5, 0, 0), (2.0, 2.0), facing)
@@ -144,8 +145,8 @@ SLABS = {
 @pytest.mark.parametrize("tm", [False, True])
 @pytest.mark.parametrize("name", SLABS)
 def test_slabs_reflect_as_they_transmit(name, tm):
-    """Mirrors and ways through have the coefficients of one slab at any angle: the transfer matrix, and no energy is
-    made. Fringes of 40 mm of wood are 4 deg apart."""
+    """Reflection and transmission coefficients are those of one slab at any angle: transfer matrix and energy
+    conservation. Fringes of 40 mm of wood are 4 deg apart."""
     m, f = replace(SLABS[name], roughness=0.0), CONFIG.center_frequency
     cosine, made_of = np.linspace(0.1, 1, 997), layer(m, CONFIG)
     back = np.array([mirror(made_of, c)[int(tm)] for c in cosine])
@@ -160,7 +161,7 @@ def test_slabs_reflect_as_they_transmit(name, tm):
 
 @pytest.mark.parametrize("name", SLABS)
 def test_delays_are_those_of_unwrapped_phases(name):
-    """Of what a slab lets through, at several angles, and of what it mirrors head on, over the middle of the sweep."""
+    """Delay of transmission at several angles, and of reflection at normal incidence, over the middle of the sweep."""
     m, share = SLABS[name], sweep_share(CONFIG)
     f = CONFIG.center_frequency * (1 + share * np.linspace(-0.5, 0.5, 2001))
     eps = m.permittivity_at(CONFIG.center_frequency)
@@ -178,8 +179,9 @@ def test_delays_are_those_of_unwrapped_phases(name):
 
 
 @pytest.mark.parametrize("closed", [False, True], ids=["sheet", "closed body"])
-def test_a_pane_flashes_once(closed):
-    """Face on, a pane echoes lambda |r| / (8 pi R) with r of the slab, be it a sheet or a body with two faces."""
+def test_a_pane_reflects_once(closed):
+    """At normal incidence a pane echoes lambda |r| / (8 pi R) with r of the slab, as a sheet or as a body with two
+    faces."""
     pane = sheet("pane", "glass", (1.5, 0, 0), (4.0, 4.0), (-1, 0, 0))
     if closed:
         pane = SceneObject("pane", box((1.503, 0, 0), (0.006, 4.0, 4.0)), MATERIALS["glass"])
@@ -197,8 +199,8 @@ def test_a_pane_flashes_once(closed):
 @pytest.mark.parametrize("angle", [0, 35])
 @pytest.mark.parametrize("board", [MATERIALS["plasterboard"], SLABS["block 250"]], ids=["plasterboard", "block"])
 def test_delay_of_a_slab(board, angle):
-    """A slab that hardly reflects, or whose rear face hardly counts, makes the target look (sqrt(eps - sin^2) - cos) d
-    further away: 0.309 m behind 0.25 m of permittivity 5."""
+    """A slab with little reflection, or whose rear face hardly contributes, shifts the apparent target by (sqrt(eps -
+    sin^2) - cos) d: 0.309 m behind 0.25 m of permittivity 5."""
     place, tilt = np.array([3.0, 0, 0]), np.deg2rad(angle)
     pane = sheet("pane", board, (1.5, 0, 0), (2.0, 2.0), (-np.cos(tilt), np.sin(tilt), 0))
     echoes = PathFinder(Scene("pane", [pane]), Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD)
@@ -209,7 +211,7 @@ def test_delay_of_a_slab(board, angle):
 
 
 def test_walls_and_doors():
-    """A stud wall is two boards, a door leaf one slab of its own thickness; concrete lets nothing through."""
+    """A stud wall is two boards, a door leaf one slab of its own thickness; concrete is opaque."""
     place = np.array([3.0, 0, 0])
     f = CONFIG.center_frequency
 
@@ -238,7 +240,7 @@ def office():
 
 @pytest.mark.parametrize(("place", "yaw"), [((6.0, 6.0, 1.2), 0.1), ((3.0, 3.0, 1.3), 2.0), ((13.0, 9.0, 1.1), -1.0)])
 def test_reciprocity_of_an_office(office, place, yaw):
-    """With the places of TX and RX swapped the field is the same to -60 dB, whatever the cause of the echoes."""
+    """With the places of TX and RX swapped the field is the same to -60 dB, whatever the type of the echoes."""
     place = np.array(place)
     echoes = office(place, Rotation.from_euler("z", yaw).as_matrix())
     assert all(len(echoes.where(bounces=n, kind=Kind.POINT)) for n in (1, 2))
@@ -250,7 +252,8 @@ def test_reciprocity_of_an_office(office, place, yaw):
 
 
 def test_thinning_keeps_the_power_of_ghosts():
-    """Of a sampled surface few scatterers are seen over mirrors, with the power of all: within 0.5 dB over 12 draws."""
+    """Of a sampled surface only some scatterers have paths over mirrors, with the power of all: within 0.5 dB over 12
+    draws."""
     wall = sheet("wall", "brick", (3.0, 0, 0), (1.6, 1.6), (-1, 0, 0))
     scene = Scene("room", [LEFT, wall])
     facets = Reflectors.of(scene, CONFIG)
@@ -285,7 +288,7 @@ def test_a_mirror_of_any_size(half, off):
 
 
 def test_an_antenna_of_high_gain_has_its_ghosts():
-    """The search knows the antenna's peak: what 30 dBi lift above the threshold is found."""
+    """The search uses the antenna's peak gain: it finds paths that 30 dBi lift above the threshold."""
     place, lift = np.array([2.6, 0.3, 0.1]), 19.5
     weak = finder([GLASS], place)(HERE, AHEAD)
     ghosts = weak.where(bounces=2, through=False, moving=False).amplitude
@@ -296,7 +299,7 @@ def test_an_antenna_of_high_gain_has_its_ghosts():
 
 
 def slab(material, cosine, tm=False):
-    """What a sheet leaves of an amplitude, relative to the air that it takes the place of; as in the beat signal."""
+    """Factor of a sheet on an amplitude, relative to the air in its place; as in the beat signal."""
     m, f = MATERIALS[material], CONFIG.center_frequency
     tau, _ = transfer_matrix([(m.permittivity_at(f), m.thickness)], cosine, f, tm)
     return np.conj(tau * np.exp(2j * np.pi * f / SPEED_OF_LIGHT * m.thickness * cosine))
@@ -305,8 +308,8 @@ def slab(material, cosine, tm=False):
 @pytest.mark.parametrize("angle", [0.0, 25.0])
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_corner_behind_a_pane(moving, angle):
-    """A metal dihedral, wholly behind 6 mm of glass: the image in its edge, lambda / (4 pi 2 R), through the pane there
-    and back; whether the pane stands or is the leaf of a door."""
+    """A metal dihedral behind 6 mm of glass: the image in its edge, lambda / (4 pi 2 R), attenuated by the pane twice;
+    for a static pane and for the leaf of a door."""
     side, turn = 0.6 / np.sqrt(8), np.deg2rad(angle)
     plates = [sheet(f"plate {k}", "metal", (2.5 - side, k * side, 0), (0.6, 0.6), (-1, -k, 0)) for k in (1, -1)]
     along = np.array([np.sin(turn), np.cos(turn), 0.0])
@@ -332,8 +335,8 @@ def test_a_corner_behind_a_pane(moving, angle):
 
 
 def test_all_phantoms_behind_a_pane():
-    """A target in a corner of two walls, all behind 6 mm of glass: every pair of ways, by one mirror, by two, straight,
-    as without the pane, times what that leaves of either."""
+    """A target in a corner of two walls, all behind 6 mm of glass: every pair of paths, over one mirror, over two,
+    direct, as without the pane, times its transmission of both paths."""
     walls = [sheet("left", "metal", (2.7, 1.2, 0), (3.0, 2.4), (0, -1, 0)), AT_END]
     pane = sheet("pane", "glass", (0.8, 0, 0), (6.0, 4.0), (-1, 0, 0))
     place = np.array([2.4, 0.5, 0.0])

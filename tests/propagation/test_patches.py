@@ -1,4 +1,4 @@
-"""Smooth curved surfaces against the physical-optics integral over the bodies that their meshes stand for."""
+"""Smooth curved surfaces against the physical-optics integral over the bodies that their meshes approximate."""
 
 from dataclasses import replace
 from functools import cache
@@ -40,13 +40,13 @@ NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
 @cache
 def body(make, *arguments):
-    """Reflectors of a body's mesh, by its maker."""
+    """Reflectors of a body's mesh, from its maker."""
     return reflectors(make(*arguments))
 
 
 @cache
 def samples(make, *arguments):
-    """Places, normals and areas of a body, by its maker."""
+    """Positions, normals and areas of a body, from its maker."""
     return make(*arguments)
 
 
@@ -60,7 +60,7 @@ PLACES = [(-0.7, 0, 0), (0, 0.8, 0.4), (0.3, 0.2, 1.0), (2.0, -1, 3)]
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("axes", [(0.2, 0.2, 0.208), (0.15, 0.2, 0.3)])
 def test_ellipsoids(axes, place):
-    """A sphere stretched by 4 % and an ellipsoid: 0.4 dB and 3 deg (two thirds of it the mesh's), formerly -25 dB."""
+    """A sphere stretched by 4 % and an ellipsoid: 0.4 dB and 3 deg (two thirds of it the mesh's)."""
     found, truth = field(body(stretched, axes), place), physical_optics(samples(ellipsoid, axes), place)
     off, turn = decibels_and_degrees(found, truth)
     assert off == pytest.approx(0, abs=0.4)
@@ -79,7 +79,7 @@ def test_far_away_an_ellipsoid_has_pi_a1_a2():
 @pytest.mark.parametrize("subdivisions", [3, 4])
 @pytest.mark.parametrize("noise", [3e-5, 2e-4])
 def test_noisy_meshes(subdivisions, noise):
-    """Corners rounded to a tenth of a millimetre, and a scan's: still one body, 1 dB from all around."""
+    """Corners rounded to a tenth of a millimetre, and a scan's: still one body, within 1 dB from all directions."""
     axes, rng = (0.15, 0.2, 0.3), np.random.default_rng(0)
     mesh = stretched(axes, subdivisions)
     scan = shapes.exact(mesh.vertices + noise * rng.normal(size=mesh.vertices.shape), mesh.faces)
@@ -98,7 +98,7 @@ def test_noisy_meshes(subdivisions, noise):
     ],
 )  # fmt: skip
 def test_half_cylinders(place):
-    """Before, at and past their borders: 0.8 dB and 4 deg; formerly -24 to -29 dB."""
+    """In front of, at and past their borders: 0.8 dB and 4 deg."""
     found = field(body(half_cylinder, 0.15, 1.0, 12), place)
     off, turn = decibels_and_degrees(
         found, physical_optics(samples(tube, 0.15, 0.5, np.pi / 2, 3 * np.pi / 2), place, soft=0.02)
@@ -119,7 +119,7 @@ def test_half_cylinders_of_other_meshes(sides, back):
 
 @pytest.mark.parametrize("material", ["concrete", "wood"])
 def test_dielectrics_reflect_as_walls_of_theirs_do(material):
-    """Fresnel's coefficient at normal incidence and the roughness factor."""
+    """Fresnel coefficient at normal incidence and roughness factor, as for a wall of the same material."""
     mesh = half_cylinder(0.15, 1.0, 12)
     share = field(reflectors(mesh, material), (-2, 0, 0)) / field(reflectors(mesh), (-2, 0, 0))
     what, smoother = MATERIALS[material], MATERIALS["metal"]
@@ -134,8 +134,8 @@ def test_dielectrics_reflect_as_walls_of_theirs_do(material):
      (0.05, (-1, 0, 0)), (0.05, (-4, 0, 0)), (0.05, (0, 0.1, 2)), (0.2, (0, 0.01, 2))],
 )  # fmt: skip
 def test_capsules(half, place):
-    """Broadside, at the joint and on end: 0.8 dB and 5 deg; formerly -6 dB. Ends of the pipe and of its roundings
-    cancel as far as they should."""
+    """Broadside, at the joint and on end: 0.8 dB and 5 deg. Ends of the pipe and of its roundings cancel as far as they
+    should."""
     found = field(body(capsule, 0.05, half), place)
     off, turn = decibels_and_degrees(found, physical_optics(samples(rounded, 0.05, half), place))
     assert off == pytest.approx(0, abs=0.8)
@@ -163,7 +163,7 @@ def sheet(bend, half, count=10, fine=900):
      ((1 / 0.3, 1 / 0.3), (0.1, 0.1))],
 )  # fmt: skip
 def test_bowls_troughs_saddles_and_domes(bend, half, place):
-    """Before, at and beyond the caustic of a hollow mirror: 2.1 dB and 20 deg, and finite throughout."""
+    """In front of, at and beyond the caustic of a concave mirror: 2.1 dB and 20 deg, and finite everywhere."""
     mesh, surface = sheet(bend, half)
     off, turn = decibels_and_degrees(field(reflectors(mesh), place), physical_optics(surface, place, soft=0.02))
     assert off == pytest.approx(0, abs=2.1)
@@ -171,8 +171,8 @@ def test_bowls_troughs_saddles_and_domes(bend, half, place):
 
 
 def test_nothing_switches():
-    """Walking past a half cylinder, from before it to behind it and over its end: frame by frame the field changes by
-    no more than its phase does."""
+    """Moving past a half cylinder, from the front to the back and over its end: between frames the field changes by no
+    more than its phase does."""
     found = reflectors(half_cylinder(0.15, 1.0, 12))
     for track in (
         np.stack([np.linspace(-1, 0.4, 281), np.full(281, 1.5), np.full(281, 0.1)], axis=1),
@@ -238,7 +238,7 @@ def test_ghosts():
 
 
 def test_a_board_hides_it():
-    """Through the finder: one flash from the ellipsoid, none behind a metal board."""
+    """Through the finder: one specular reflection of the ellipsoid, none behind a metal board."""
     egg = SceneObject("egg", shapes.placed(stretched((0.15, 0.2, 0.3)), (2, 0, 0)), MATERIALS["metal"])
     board = SceneObject("board", shapes.box((1, 0, 0), (0.02, 0.8, 0.8)), MATERIALS["metal"])
     at_egg = []

@@ -1,4 +1,4 @@
-"""What is a ghost, and what each path met on its way: by places that the radar can and cannot resolve."""
+"""Path types: distinction between real targets and ghosts by the radar's resolution."""
 
 from types import SimpleNamespace
 
@@ -24,7 +24,7 @@ NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
 
 def found(objects, points=NOTHING, config=CONFIG):
-    """Paths at the origin, and their types."""
+    """Paths of a radar at the origin, and their types."""
     scene = Scene("place", [SceneObject(f"{k}", mesh, MATERIALS[name]) for k, (mesh, name) in enumerate(objects)])
     paths = PathFinder(scene, points, Reflectors.of(scene, CONFIG), config, 1e-9)(HERE, AHEAD)
     lengths = paths.lengths(config, STILL, 0.0)[..., 0]
@@ -35,12 +35,12 @@ def found(objects, points=NOTHING, config=CONFIG):
 
 
 def point(*place):
-    """A target of 1 m^2."""
+    """Target with a cross section of 1 m^2."""
     return Scatterers.points(np.array(place), np.ones(1))
 
 
 def wall(distance, side=0.0, size=(6.0, 3.0)):
-    """A metal wall before the radar, or beside it."""
+    """Metal wall in front of the radar, or beside it."""
     if side:
         return rectangle((distance, side, 0), size, (0, -np.sign(side), 0)), "metal"
     return rectangle((distance, 0, 0), size, (-1, 0, 0)), "metal"
@@ -48,7 +48,7 @@ def wall(distance, side=0.0, size=(6.0, 3.0)):
 
 @pytest.mark.parametrize("shear", [0.0, 0.05, 0.5])
 def test_a_corner_that_is_not_quite_square_is_none(shear):
-    """Buildings are out of square by some tenths of a degree; their corners echo from where they stand all the same."""
+    """Corners out of square by some tenths of a degree are no ghosts: their echo is at their position."""
     corner = []
     for bearing, towards in ((135.0, -135.0), (-135.0 + shear, 135.0 + shear)):
         along, facing = (np.array([np.cos(a), np.sin(a), 0]) for a in np.deg2rad([bearing, towards]))
@@ -62,7 +62,7 @@ def test_a_corner_that_is_not_quite_square_is_none(shear):
 
 @pytest.mark.parametrize(("gap", "ghost"), [(0.015, False), (0.5, True)])
 def test_an_image_behind_a_wall(gap, ghost):
-    """A thing before a wall is a ghost behind it, if the radar can tell their ranges apart."""
+    """The image of an object in a wall is a ghost, if the radar resolves their ranges."""
     paths, types = found([wall(3.0)], point(3.0 - gap, 0.3, 0.0))
     mirrored = paths.bounces == 2
     assert mirrored.any()
@@ -71,7 +71,7 @@ def test_an_image_behind_a_wall(gap, ghost):
 
 @pytest.mark.parametrize(("gap", "ghost"), [(0.1, False), (1.0, True)])
 def test_an_image_beside_a_wall(gap, ghost):
-    """At the same range, what tells them apart is the beam: 0.33 m wide either way at 3 m."""
+    """At equal range, the beam distinguishes them: 0.33 m wide to either side at 3 m."""
     paths, types = found([wall(3.0, side=1.2)], point(3.0, 1.2 - gap, 0.0))
     mirrored = paths.bounces == 2
     assert mirrored.any()
@@ -79,8 +79,9 @@ def test_an_image_beside_a_wall(gap, ghost):
 
 
 @pytest.mark.filterwarnings("error")
-def test_one_antenna_tells_no_directions_apart():
-    """The image beside a wall that a row of eight tells from the wall is at its range, and so no ghost."""
+def test_one_antenna_resolves_no_directions():
+    """The image beside a wall that a row of eight antennas separates from the wall is at its range: no ghost for
+    one."""
     alone = CONFIG.model_copy(update={"tx_order": (0,), "rx": (0,)})
     paths, types = found([wall(3.0, side=1.2)], point(3.0, 0.2, 0.0), alone)
     mirrored = paths.bounces == 2
@@ -88,7 +89,7 @@ def test_one_antenna_tells_no_directions_apart():
 
 
 def test_what_stands_before_a_wall_is_no_slab():
-    """A metal pole before a concrete wall keeps some of its reflection out; nothing passes through anything."""
+    """A metal pole in front of a concrete wall blocks part of its reflection; no path passes a slab."""
     pole = placed(cylinder((0, 0, 0), 0.02, 3.0, 24), (2.0, 0.03, 0))
     paths, types = found([(box((3.1, 0, 0), (0.2, 6, 3)), "concrete"), (pole, "metal")])
     assert not paths.through.any()

@@ -21,7 +21,7 @@ CONFIG = PRESETS["radarize"]
 
 
 def scanned_wall(seed, noise, step=0.05, size=2.0):
-    """A wall at x = 2 m, facing -x, as a scanner gives it: triangles of `step`, corners off by `noise` RMS."""
+    """A wall at x = 2 m, facing -x, as a scanner gives it: triangles of `step`, corners with `noise` RMS error."""
     n = round(size / step) + 1
     y, z = np.meshgrid(np.linspace(-size / 2, size / 2, n), np.linspace(-size / 2, size / 2, n), indexing="ij")
     vertices = np.stack([np.full(y.size, 2.0), y.ravel(), z.ravel()], axis=1)
@@ -32,7 +32,7 @@ def scanned_wall(seed, noise, step=0.05, size=2.0):
 
 
 def finder(mesh):
-    """Of the paths to a wall of concrete."""
+    """Finder of the paths to a concrete wall."""
     scene = Scene("scan", [SceneObject("wall", mesh, MATERIALS["concrete"])])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     return PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)
@@ -43,7 +43,7 @@ scanned = cache(lambda seed, noise: finder(scanned_wall(seed, noise)))
 
 
 def coherent_field(finder, position):
-    """Sum of all specular reflections, edges and corners that can be seen."""
+    """Sum of all visible specular reflections, edges and corners."""
     echoes = finder(position, np.eye(3))
     return field(echoes, position, CONFIG.wavelength)
 
@@ -58,7 +58,7 @@ def test_a_scanned_wall_does_not_sparkle(position):
 
 
 def test_a_scanned_corner_is_two_planes():
-    """Two noisy walls that share an edge stay apart."""
+    """Two noisy walls that share an edge stay separate."""
     wall = scanned_wall(3, 5e-4, size=1.0)
     other = wall.copy()
     other.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1], [2, 0.5, 0]))
@@ -69,14 +69,14 @@ def test_a_scanned_corner_is_two_planes():
 
 
 def test_curved_surfaces_are_no_planes():
-    """A finely tessellated pipe and ball bend too much: none of their facets grows beyond itself."""
+    """Facets of a finely tessellated pipe and sphere are not joined: the surface bends too much."""
     for mesh, side in ((shapes.cylinder((0, 0, 0), 0.05, 1, 60), 2), (shapes.sphere((0, 0, 0), 0.1), 1)):
         on_side = [r for r in planes.regions(mesh) if abs(mesh.face_normals[r[0]] @ [0, 0, 1]) < 0.999]
         assert max(len(r) for r in on_side) <= side
 
 
 def tiled(quads, region):
-    """Quadrilaterals that do not overlap and together are a region."""
+    """Whether quadrilaterals do not overlap and together cover a region."""
     shapes_ = [shapely.Polygon(q) for q in quads]
     assert sum(s.area for s in shapes_) == pytest.approx(region.area)
     assert shapely.union_all(shapes_).symmetric_difference(region).area < 1e-5
@@ -135,7 +135,7 @@ def test_leaning_faces_are_covered_to_the_bit_as_their_outlines_are_cut(monkeypa
             ]
 
 
-def test_an_ell_shaped_wall_flashes_where_it_is():
+def test_an_ell_shaped_wall_reflects_where_it_is():
     """The coherent echo of an L-shaped mesh is that of a large wall in front of it and none in front of the notch."""
     ell = shapely.Polygon([(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)])
     mesh = shapes.polygon(ell, (2, 0, 0), (0, -1, 0), (0, 0, 1))

@@ -17,7 +17,7 @@ from radarsim.world.scene import Scene
 
 
 def plate(half, gamma=-1.0, center=(0.0, 0.0, 0.0)):
-    """A rectangle in the plane x = 0, facing -x, sides along y and z."""
+    """Rectangle in the plane x = 0, facing -x, sides along y and z."""
     x, y, z = np.eye(3)
     return conductors((center, z, y, half[::-1]), gamma=gamma)
 
@@ -32,8 +32,8 @@ def field(facets, position):
 
 @pytest.mark.parametrize("distance", [0.5, 2.0, 4.0])
 @pytest.mark.parametrize("gamma", [-1.0, -0.25])
-def test_wall_flash(distance, gamma):
-    """|a| = lambda |Gamma| / (4 pi 2 R) from a wall that fills the view."""
+def test_wall_reflection(distance, gamma):
+    """|a| = lambda |Gamma| / (4 pi 2 R) for a wall that fills the field of view."""
     amplitude = abs(field(plate((40, 40), gamma), (-distance, 0, 0)))
     assert 20 * np.log10(amplitude / (LAMBDA * abs(gamma) / (8 * np.pi * distance))) == pytest.approx(0, abs=0.05)
 
@@ -124,8 +124,8 @@ def test_plate_over_twenty_degrees():
     assert np.abs(20 * np.log10(found / expected)[lobes]).max() < 1
 
 
-def test_no_step_as_the_flash_leaves_the_plate():
-    """Sliding past the edge in tenths of a millimetre, the field never jumps."""
+def test_no_step_as_the_reflection_leaves_the_plate():
+    """Moving past the edge in tenths of a millimetre, the field is continuous."""
     y = 0.3 + np.arange(-100, 100) * 1e-4
     values = np.array([field(plate((0.3, 0.3)), (-1, at, 0)) for at in y])
     assert np.max(np.abs(np.diff(values))) < 0.02 * np.max(np.abs(values))
@@ -144,7 +144,7 @@ def test_behind_a_one_sided_plate_there_is_nothing():
 
 @pytest.mark.parametrize(("material", "side"), [("metal", 0.019), ("metal", 0.01), ("concrete", 0.099), ("wood", 0.05)])
 def test_small_plates_keep_their_echo(material, side):
-    """The physical-optics integral of a small plate in a scene, whatever it is made of."""
+    """Physical-optics integral of a small plate in a scene, for any material."""
     distance = 3.0
     mesh = shapes.rectangle((distance, 0, 0), (side, side), (-1, 0, 0))
     scene = Scene("plate", [SceneObject("plate", mesh, MATERIALS[material])])

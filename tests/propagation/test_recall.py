@@ -1,4 +1,4 @@
-"""The finder's choice of mirrors loses nothing: its ghosts against those over all reflectors, in all orders."""
+"""Recall of the search for mirrors: its ghosts against those over all reflectors, in all orders."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ CONFIG = PRESETS["radarize"]
 
 
 def every_mirror(observation, flat, obstacles):
-    """All reflectors that turn a face to the radar, and after them all before which they stand, as corners tell."""
+    """All reflectors that turn a face to the radar, and for each all reflectors with a corner in front of it."""
     found = []
     for p in observation.position:
         over = np.einsum("md,md->m", p - flat.center, flat.normal)
@@ -43,14 +43,15 @@ def every_mirror(observation, flat, obstacles):
 
 
 def power(frames):
-    """Of all paths over mirrors that move nothing and pass no slab."""
+    """Power of all static paths over mirrors without slabs."""
     every = Paths.joined([p.where(moving=False, through=False) for p in frames.paths])
     return np.sum(np.abs(every.amplitude[every.bounces > 0]) ** 2)
 
 
 @pytest.mark.parametrize("name", ["office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"])
 def test_ghosts_that_are_found(name, monkeypatch):
-    """At least 99 % of the power of ghosts, in one frame; over four of each scene it is 99.4 to 100 %."""
+    """At least 99 % of the power of ghosts is found in one frame; over four frames of each scene it is 99.4 to 100
+    %."""
     scene = Scene.load(name)
     scenario = Scenario(scene, Walk("handheld", 30).through(scene, 1), CONFIG, seed=1)
     times = np.array([19.0])
@@ -62,7 +63,7 @@ def test_ghosts_that_are_found(name, monkeypatch):
 
 
 def rooms():
-    """A room whose end is a glass partition and a closed door of wood, and behind these a furnished one of concrete."""
+    """A room whose end is a glass partition and a closed wooden door, in front of a furnished concrete room."""
     sheets = [
         ("floor", "concrete", (3, 0, 0), (8, 5), (0, 0, 1)),
         ("ceiling", "concrete", (3, 0, 2.6), (8, 5), (0, 0, -1)),
@@ -84,7 +85,7 @@ def rooms():
 
 @pytest.mark.parametrize("yaw", [-0.3, 0.3])
 def test_ghosts_behind_glass_and_doors(yaw, monkeypatch):
-    """The same of those that pass a pane or a door on their way."""
+    """The same for ghosts whose path passes a pane or a door."""
     scene = rooms()
     surface = Surface(scene, np.random.default_rng(0), 60.0)
     finder = PathFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 7.5e-9)

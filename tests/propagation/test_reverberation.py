@@ -1,4 +1,4 @@
-"""Diffuse multipath: its power in an integrating sphere, and that its walks are of the world."""
+"""Diffuse multipath: its power in an integrating sphere, and that its walks are fixed in the world."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def ball(radius, material=BLACK, level=1.0, *others):
 
 
 def multipath(scene, seed=0, position=(0.0, 0.0, 0.0), rotation=AHEAD, threshold=0.0):
-    """Its detours, the paths of one frame, and their lengths for a lone antenna, m."""
+    """Detours of a scene, the paths of one frame, and their lengths for a single antenna, m."""
     detours = Detours.of(scene, CONFIG, np.random.default_rng(seed))
     none = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     finder = PathFinder(scene, Cluttered(none, none, detours), None, CONFIG, threshold, range=200.0, antenna=ISOTROPIC)
@@ -46,13 +46,13 @@ def multipath(scene, seed=0, position=(0.0, 0.0, 0.0), rotation=AHEAD, threshold
 
 @pytest.fixture
 def uniform(monkeypatch):
-    """Structure alone, the same on every surface."""
+    """Structure only, the same on every surface."""
     monkeypatch.setattr(clutter, "densities", lambda scene, place, normal: np.zeros(len(place)))
 
 
 @pytest.mark.parametrize("level", [0.4, 1.0, 3.0])
 def test_an_integrating_sphere(uniform, level):
-    """With albedo rho, all of a sphere of radius R is lit alike, after the n-th scattering with rho^n of the power. At
+    """With albedo rho, all of a sphere of radius R is lit uniformly: n scatterings leave rho^n of the power. At
     the middle an isotropic antenna gets lambda^2 rho^n / (4 pi^2 R^2) of it, half of that in its polarisation, twice
     for both ways round, and a quarter of it both from and to where it looks. The mean chord is 4 R / 3."""
     radius, seeds = 6.0, 3
@@ -71,7 +71,7 @@ def test_an_integrating_sphere(uniform, level):
 
 
 def test_walls_that_mirror_hold_the_power(uniform):
-    """What a metal sphere does not scatter it mirrors: each walk ends detours on all of its surfaces."""
+    """A metal sphere reflects all power that it does not scatter: each walk ends detours on all of its surfaces."""
     detours, _ = multipath(ball(2.0, MATERIALS["metal"]))
     begun = len(np.unique(detours.begin, axis=0))
     assert len(detours) == pytest.approx(STEPS * begun, rel=2e-3)  # some slip through between triangles
@@ -82,7 +82,7 @@ def test_walls_that_mirror_hold_the_power(uniform):
 
 
 def test_shares_of_power_add_up(uniform):
-    """Of a lossless pane all is scattered, mirrored or let through."""
+    """For a lossless pane, scattered, reflected and transmitted power add up to one."""
     glass = replace(MATERIALS["glass"], permittivity=lambda _: 6.31 + 0j)
     scene = Scene(
         "pane", [SceneObject("pane", shapes.rectangle((0, 0, 0), (1, 1), (1, 0, 0)), glass)],
@@ -95,7 +95,7 @@ def test_shares_of_power_add_up(uniform):
 
 
 def test_paths_are_as_long_as_their_detours(uniform):
-    """Out to one end, along the walk, and back from the other, whichever comes first."""
+    """Out to one end, along the walk, and back from the other, in both directions."""
     here = np.array([0.5, -0.3, 0.2])
     detours, paths = multipath(ball(2.0), position=here)
     seen = [i for i in range(len(detours)) if detours.begin[i, 0] > here[0] and detours.end[i, 0] > here[0]]
@@ -109,12 +109,12 @@ def test_paths_are_as_long_as_their_detours(uniform):
 
 
 def test_bare_rooms_have_none():
-    """They are computed by their surfaces' laws alone."""
+    """Without clutter there are no detours."""
     assert len(Detours.of(ball(2.0, level=0.0), CONFIG, np.random.default_rng(0))) == 0
 
 
 def test_what_stands_in_the_way_hides_them(uniform):
-    """A metal plate before the radar hides each detour with an end behind it."""
+    """A metal plate in front of the radar hides each detour with an end behind it."""
     near, half = 0.295, 1.5
     plate = SceneObject("plate", shapes.box((0.3, 0, 0), (0.01, 2 * half, 2 * half)), MATERIALS["metal"])
     detours, paths = multipath(ball(2.0, BLACK, 1.0, plate))
@@ -127,7 +127,7 @@ def test_what_stands_in_the_way_hides_them(uniform):
 
 
 def test_a_threshold_leaves_out_the_weak_ones(uniform):
-    """And nothing else, in the same order."""
+    """A threshold removes only weak echoes and keeps their order."""
     _, all_ = multipath(ball(2.0))
     threshold = float(np.median(np.abs(all_.amplitude)))
     _, some = multipath(ball(2.0), threshold=threshold)

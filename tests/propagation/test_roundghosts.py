@@ -1,4 +1,4 @@
-"""Round bodies seen over mirrors, against the physical-optics integral between two images of the radar."""
+"""Ghosts of round bodies over mirrors, against the physical-optics integral between two images of the radar."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ HIGH = np.array([0.0, 0.0, 0.8])
 
 
 def ghosts(body, wall=WALL):
-    """Ghosts of a metal body as seen from the origin."""
+    """Ghosts of a metal body for a radar at the origin."""
     found = Reflectors.of(Scene("ghosts", [wall, SceneObject("body", body, MATERIALS["metal"])]), CONFIG)
     facing = np.flatnonzero(np.abs(found.flat.normal[:, 1]) > 0.99)[:1]
     return curved_ghosts.ghosts(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
@@ -65,7 +65,7 @@ def pole(center, radius, length, around=400, along=2500):
 
 @pytest.mark.parametrize("kind", ["sphere", "pole"])
 def test_ghosts_of_round_bodies(kind):
-    """A 10 cm sphere and a 3 cm pole beside a metal wall: straight and over the wall, and over it both ways."""
+    """A 10 cm sphere and a 3 cm pole beside a metal wall: over the wall on one path, and on both."""
     center = np.array([2.5, 0.2, 0.1])
     if kind == "sphere":
         body, surface = shapes.sphere(center, 0.1, 4), sphere(center, 0.1)
@@ -85,13 +85,13 @@ def test_ghosts_of_round_bodies(kind):
         assert np.rad2deg(np.angle(turned)) == pytest.approx(0, abs=6)
 
 
-def leg_ghosts(bottom, tilt):
-    """Ghosts over a metal floor of a leg 2 m off, up to 0.7 m and tilted (deg), and the integral over what is above it,
-    both as the sum of the two orders of floor and leg."""
+def pole_ghosts(bottom, tilt):
+    """Ghosts of a pole 2 m off over a metal floor, up to 0.7 m and tilted (deg), and the integral over the part above
+    the floor, both as the sum of the two orders of floor and pole."""
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
-    leg = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
-    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
+    rod = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
+    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, rod))
     points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
     points, normals = turned.apply(points) + center, turned.apply(normals)
     lit = points[:, 2] > 0
@@ -102,19 +102,19 @@ def leg_ghosts(bottom, tilt):
 
 @pytest.mark.parametrize("bottom", [0.0, -0.4, 0.03])
 @pytest.mark.parametrize("tilt", [0.0, 1e-6, -1e-6, 0.05, -0.05, 0.5, -0.5])
-def test_a_leg_on_a_level_floor(bottom, tilt):
-    """A table leg that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
+def test_a_pole_on_a_level_floor(bottom, tilt):
+    """A pole that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
 
     With the floor it is a corner of 90 deg, whose ghosts come from its foot; tilted, from above or from below that.
     """
-    value, truth = leg_ghosts(bottom, tilt)
+    value, truth = pole_ghosts(bottom, tilt)
     assert 20 * np.log10(abs(value) / abs(truth)) == pytest.approx(0, abs=0.5)
     # Two conductors: upright fields keep their sign.
     assert np.rad2deg(np.angle(-value / truth)) == pytest.approx(0, abs=6)
 
 
 def test_a_finder_has_them():
-    """A lamp beside a wall: its ghosts are among the echoes; a board in the way of the wall hides them."""
+    """A lamp beside a wall: its ghosts are among the echoes; a board in front of the wall hides them."""
     lamp = SceneObject("lamp", shapes.sphere((2.5, 0.2, 0.1), 0.1, 3), MATERIALS["metal"])
     board = SceneObject("board", shapes.box((1.3, 0.75, 0), (0.8, 0.05, 1.0)), MATERIALS["metal"])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
@@ -129,8 +129,8 @@ def test_a_finder_has_them():
 
 @pytest.mark.parametrize("kind", ["sphere", "pole"])
 def test_ghosts_behind_a_pane(kind):
-    """Over a wall on one way and on both, all of it behind 6 mm of glass: as without it, times what the pane leaves on
-    either way at the angle at which that meets it, and later by what it delays."""
+    """Over a wall on one path and on both, all behind 6 mm of glass: as without it, times the pane's transmission of
+    both paths at their angles of incidence, and delayed by it."""
     center = np.array([2.5, 0.2, 0.0])
     shape = shapes.sphere(center, 0.1, 4) if kind == "sphere" else shapes.cylinder(center, 0.03, 1.2, 24)
     wall = SceneObject("wall", shapes.rectangle((2.1, 1.0, 0), (1.8, 3.0), (0, -1, 0)), MATERIALS["metal"])
@@ -156,7 +156,7 @@ def test_ghosts_behind_a_pane(kind):
 
 
 def test_no_pair_of_segments_is_passed_over():
-    """Ghosts of random bodies over random mirrors are those of all pairs of segments, one by one."""
+    """Ghosts of random bodies over random mirrors are those of all pairs of segments, tried one by one."""
     rng = np.random.default_rng(4)
     plates = [
         conductors((place, *Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix()[:2], half))

@@ -18,7 +18,7 @@ def pattern(lobe, source, receiver):
 
 
 def scattered_share(lobe, theta_in, steps=200):
-    """Power scattered over power received, in units of sigma0 / 4: integral of sigma / (4 pi cos_in) over the sky."""
+    """Scattered over incident power, in units of sigma0 / 4: integral of sigma / (4 pi cos_in) over the hemisphere."""
     theta = (np.arange(steps) + 0.5) / steps * np.pi / 2
     phi = (np.arange(2 * steps) + 0.5) / (2 * steps) * 2 * np.pi
     source = direction(theta_in, 0.0)
@@ -40,7 +40,7 @@ def test_lambert_scatters_its_share_at_any_angle(theta):
 
 @pytest.mark.parametrize("shape", [(1.0, 0.0, 4.0), (0.5, 0.2, 4.0), (0.0, 1.0, 10.0), (0.4, 0.1, 1.0)])
 def test_energy_is_bounded(shape):
-    """All of the share at normal incidence, never more than it at any other."""
+    """All of the power fraction at normal incidence, and never more at other angles."""
     shares = [scattered_share(lobe(*shape), theta, 60) for theta in (0.0, 0.3, 0.7, 1.1, 1.5)]
     assert shares[0] == pytest.approx(1, abs=2e-3)
     assert max(shares) < 1.002
@@ -75,7 +75,7 @@ def test_concentration_of_no_lobe_is_lambert():
 
 @pytest.mark.parametrize("name", sorted(MATERIALS))
 def test_materials_share_out_no_more_than_there_is(name):
-    """Diffuse and specular power together stay below what falls on the surface."""
+    """Diffuse and specular power together stay below the incident power."""
     item = MATERIALS[name]
     assert 0 <= item.directive and 0 <= item.backscatter and item.directive + item.backscatter <= 1
     gamma = abs(complex(item.fresnel(np.array(1.0), 77e9)[0]))

@@ -1,4 +1,4 @@
-"""Scatterers drawn on demand: the same world from anywhere, the same power from near and far, no popping."""
+"""Scatterers generated on demand: the same world from any position, the same power at any distance, no popping."""
 
 from dataclasses import replace
 
@@ -57,7 +57,7 @@ def table(scatterers):
 
 
 def test_the_same_scatterers_from_everywhere():
-    """What is seen from here and from there is the same, and all of it is in the whole world's list."""
+    """Scatterers visible from two positions are the same, and all of them are in the list of the whole world."""
     world = surface()
     here, there, everywhere = (table(s) for s in (
         world.near(np.array([[1.0, 0, 0]]), 3.0), world.near(np.array([[2.0, 0.5, 0.2]]), 3.0), world.all(),
@@ -69,7 +69,7 @@ def test_the_same_scatterers_from_everywhere():
 
 
 def test_nothing_in_reach_is_missing():
-    """Every scatterer that `detail` gives a weight from a position is drawn there."""
+    """Every scatterer with a nonzero `detail` weight from a position is generated there."""
     world, position = surface(), np.array([1.3, -0.4, 0.1])
     drawn, ranked = world.near(position[None], 3.0), world.near(np.array([[x, 0.0, 0] for x in range(7)]), 10.0)
     distance = np.linalg.norm(ranked.position - position, axis=1)
@@ -126,7 +126,7 @@ def amplitudes(finder, position):
 
 
 def test_nothing_pops_along_a_walk():
-    """Frame to frame on a straight walk no scatterer comes, goes or changes by more than a part of its neighbours."""
+    """On a straight walk no scatterer appears or changes by more than a fraction of its neighbours between frames."""
     finder = PathFinder(None, surface(), None, CONFIG, range=4.0)
     path = [np.array([x, 0.1, 0.0]) for x in 0.5 + 0.03 * np.arange(12)]
     frames = [amplitudes(finder, p) for p in path]
@@ -222,7 +222,7 @@ def test_cells_hold_ten_scatterers():
 
 
 def test_cost_does_not_depend_on_the_building():
-    """A corridor of 12 m and one of 120 m: as many scatterers around the sensor, and no memory for the others."""
+    """A corridor of 12 m and one of 120 m: as many scatterers around the sensor, and no memory for the rest."""
     near = []
     for length in (12.0, 120.0):
         world = Surface(room(length), np.random.default_rng(0))
@@ -233,7 +233,7 @@ def test_cost_does_not_depend_on_the_building():
 
 
 def test_a_room_in_one_mesh_has_the_floor_of_one_in_parts():
-    """As in a scan: scatterers, flat parts and small things on floor and ceiling are told from those on walls."""
+    """As in a scan: scatterers, flat parts and objects on floor and ceiling are distinguished from those on walls."""
     parts = [item.mesh for item in SCENE.objects]
     whole = Scene(
         "scan",

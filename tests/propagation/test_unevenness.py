@@ -1,4 +1,4 @@
-"""Uneven walls: the flash against Kirchhoff's integral in full, and its statistics against closed forms."""
+"""Uneven walls: the specular reflection against Kirchhoff's integral, and its statistics against closed forms."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,8 @@ def heights(unevenness=1.0, seed=0):
 
 
 def kirchhoff(field, place):
-    """Of a wall at x = 0, over that of a flat one: exact paths, fine steps, a disc that fades over a long way."""
+    """Kirchhoff's integral of a wall at x = 0, relative to a flat one: exact paths, fine steps, a wide soft
+    aperture."""
     flat = 0.12 * place[0] + 0.1
     x = np.arange(-2 * flat, 2 * flat, 2.5e-3)
     y, z = np.meshgrid(x, x, indexing="ij")
@@ -53,8 +54,8 @@ def kirchhoff(field, place):
 
 
 @pytest.mark.parametrize("distance", [0.6, 1.5, 3.0])
-def test_the_flash_is_kirchhoffs_integral(distance):
-    """At several places before a wall, within the paraxial terms that the sum leaves out."""
+def test_the_reflection_is_kirchhoffs_integral(distance):
+    """At several places in front of a wall, up to the neglected terms beyond the paraxial ones."""
     field = heights()
     for y in (-0.8, 0.13, 1.1):
         place = np.array([[distance, y, 0.3]])
@@ -62,7 +63,7 @@ def test_the_flash_is_kirchhoffs_integral(distance):
         assert abs(found - kirchhoff(field, place[0])) < 0.06
 
 
-def test_a_flat_wall_keeps_its_flash():
+def test_a_flat_wall_keeps_its_reflection():
     place = np.array([[2.0, 0.4, 0.3]])
     assert abs(heights(1e-9).factors(place, place * [0, 1, 1], ALL, LAMBDA)[0] - 1) < 1e-5
     assert heights(0) is None
@@ -70,14 +71,14 @@ def test_a_flat_wall_keeps_its_flash():
 
 @pytest.fixture(scope="module")
 def seen():
-    """F of a quarter of the usual unevenness along walls of many seeds, at places 0, 1, 2, 4, 8 and 1000 cm on."""
+    """F for a quarter of the usual unevenness along walls of many seeds, at offsets of 0, 1, 2, 4, 8 and 1000 cm."""
     steps = np.array([0.0, 0.01, 0.02, 0.04, 0.08, 10.0])
     place = np.stack([np.full_like(steps, 2.0), steps, np.full_like(steps, 0.3)], axis=1)
     walls = [heights(0.25, seed) for seed in range(400)]
     return steps, np.array([w.factors(place, place * [0, 1, 1], np.ones(len(steps)), LAMBDA) for w in walls])
 
 
-def test_mean_and_power_of_the_flash(seen):
+def test_mean_and_power_of_the_reflection(seen):
     """The coherent part is the characteristic function of the heights, and no power is lost."""
     factors = seen[1]
     variance = sum((0.25 * rms) ** 2 for rms, _ in SCALES)
@@ -86,7 +87,7 @@ def test_mean_and_power_of_the_flash(seen):
 
 
 def test_correlation_along_the_wall(seen):
-    """That of the screen: free space is an all-pass filter."""
+    """The correlation of F is that of the screen: free space is an all-pass filter."""
     steps, factors = seen
     found = np.mean(factors * factors[:, :1].conj(), axis=0)
     lost = sum((0.25 * rms) ** 2 * (1 - np.exp(-((steps / length) ** 2))) for rms, length in SCALES)
@@ -94,7 +95,7 @@ def test_correlation_along_the_wall(seen):
 
 
 def test_heights_are_as_rough_as_they_say():
-    """RMS, and how far the middle is from a straightedge of a metre: within what plasterers are allowed, 5 mm."""
+    """RMS, and deviation from a straightedge of a metre: within the tolerance of plasterers, 5 mm."""
     y = np.arange(0, 400, 0.5)
     middle = np.array([heights(seed=s)(np.stack([0 * y, y, 0 * y], axis=1)) for s in range(20)])
     variance = sum(rms**2 for rms, _ in SCALES)
@@ -108,7 +109,7 @@ def finder(scene):
     return PathFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG, field), CONFIG, antenna=ISOTROPIC)
 
 
-def flash(scene, place):
+def reflection(scene, place):
     """Amplitude of the plane's own echo."""
     echoes = finder(scene)(np.array(place), np.diag([-1.0, -1.0, 1.0]))
     return echoes.amplitude[np.trace(echoes.images[:, :, :3], axis1=1, axis2=2) > 0.5][0]
@@ -117,14 +118,14 @@ def flash(scene, place):
 def test_finder_takes_the_factor_of_plaster_and_none_of_glass():
     place = np.array([1.5, 0.2, 0.1])
     factor = heights().factors(place[None], place[None] * [0, 1, 1], ALL, LAMBDA)[0]
-    found = flash(wall(1.0), place) / flash(wall(0.0), place)
+    found = reflection(wall(1.0), place) / reflection(wall(0.0), place)
     assert abs(found - factor) < 1e-6
     assert abs(factor - 1) > 0.1
-    assert flash(wall(1.0, "glass"), place) == flash(wall(0.0, "glass"), place)
+    assert reflection(wall(1.0, "glass"), place) == reflection(wall(0.0, "glass"), place)
 
 
 def test_nothing_jumps_where_the_foot_leaves_the_wall():
-    """Along 4 cm across the wall's edge, in steps that turn no phase by much, the field goes on smoothly."""
+    """Over 4 cm across the wall's edge, in steps of small phase change, the field is continuous."""
     at = np.arange(2.98, 3.02, 1e-3)
     places = np.stack([np.full_like(at, 2.0), at, np.full_like(at, 0.1)], axis=1)
     found, field = finder(wall(1.0)), []

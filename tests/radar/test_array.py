@@ -79,12 +79,12 @@ def test_the_low_power_square_is_full():
 
 
 def test_channels_of_the_low_power_board_are_reversed_by_turns():
-    """As TI's files say: compRangeBiasAndRxChanPhase 0.0 1 0 -1 0 1 0 -1 0 1 0 -1 0."""
+    """As in TI's files: compRangeBiasAndRxChanPhase 0.0 1 0 -1 0 1 0 -1 0 1 0 -1 0."""
     assert BOARDS["iwrl6432boost"].nominal_calibration == ((1, 0), (-1, 0)) * 3
 
 
-def test_rows_less_than_a_wavelength_apart_tell_elevation():
-    """The AWR2944's are 0.8 wavelengths apart; of the AOP's column every second row would be one apart."""
+def test_rows_less_than_a_wavelength_apart_resolve_elevation():
+    """The AWR2944's rows are 0.8 wavelengths apart; every second row of the AOP's column would be one apart."""
     config = radar("awr2944evm")
     pairs, grid = elevation_pairs(config), _grid("awr2944evm")
     assert grid[pairs[:, 1]] - grid[pairs[:, 0]] == pytest.approx(np.tile([0, 1.6], (4, 1)))

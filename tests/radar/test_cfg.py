@@ -49,7 +49,7 @@ def test_values_of_a_public_file(recordings):
     assert config.tx_order == (0, 2, 1) and config.slot == (0, 2, 1)
     assert config.rx == (0, 1, 2, 3)
     assert config.iq_order == "qqii"
-    assert config.range_resolution == pytest.approx(0.043, abs=5e-4)  # as the file's comment says
+    assert config.range_resolution == pytest.approx(0.043, abs=5e-4)  # as in the file's comment
     doppler, _ = load_config(recordings / "configs" / "xwr_raw_ros_1843_doppler_v0.cfg")
     assert doppler.tx == (0, 2)
 

@@ -82,19 +82,19 @@ def test_sizes_that_do_not_fit():
 
 
 @pytest.mark.parametrize("iq_order", ["iiqq", "qqii"])
-def test_near_echoes_tell_the_iq_order(iq_order):
+def test_near_echoes_show_the_iq_order(iq_order):
     config = small(samples=64, iq_order=iq_order)
     rng = np.random.default_rng(1)
     tones = np.exp(2j * np.pi * np.outer([3.3, 9.1, 20.2], np.arange(64)) / 64)
     signal = (np.array([800, 300, 100]) @ tones) + rng.normal(0, 20, (2, *config.frame_shape[:-1]))
     frames = np.stack([signal.real + 50, signal.imag - 70], -1).round().astype(np.int16)
-    # What the configuration says about the order must not matter.
-    for claimed in ("iiqq", "qqii"):
-        decoded = decode(encode(frames, config), config.model_copy(update={"iq_order": claimed}))
-        assert range_balance(decoded) * (1 if claimed == iq_order else -1) > 10
+    # The order in the configuration must not matter.
+    for order in ("iiqq", "qqii"):
+        decoded = decode(encode(frames, config), config.model_copy(update={"iq_order": order}))
+        assert range_balance(decoded) * (1 if order == iq_order else -1) > 10
 
 
-def test_noise_or_silence_does_not_tell_the_iq_order():
+def test_noise_or_silence_does_not_show_the_iq_order():
     config = small(samples=64, loops=16)
     noise = np.random.default_rng(2).normal(0, 50, (4, *config.frame_shape)).astype(np.int16)
     assert abs(range_balance(noise)) < 1

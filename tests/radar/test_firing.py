@@ -1,4 +1,5 @@
-"""Which transmitters fire when: several at once, several times a loop, in binary phase modulation, in a subframe."""
+"""Firing orders: several transmitters simultaneously, several times per loop, in binary phase modulation, in a
+subframe."""
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def test_transmitters_at_once_are_one_midway():
 
 
 def test_an_echo_of_two_at_once_has_the_phase_of_the_middle():
-    """The sum of two plane waves is one of the middle's phase, and an amplitude that all receivers share."""
+    """The sum of two plane waves has the phase of the midpoint, and an amplitude common to all receivers."""
     config, u = parse_cfg(text(3)), np.array([0.95, 0.2, 0.05])
     k = 2 * np.pi / config.wavelength
     both = np.exp(-1j * k * (virtual_positions(PRESET)[:2] @ u)).sum(axis=0)  # TX1 and TX2, per receiver
@@ -49,7 +50,7 @@ def test_an_echo_of_two_at_once_has_the_phase_of_the_middle():
     assert ratio == pytest.approx(np.full(4, ratio[0])) and abs(ratio[0].imag) < 1e-9
 
 
-def test_what_is_lost_is_said():
+def test_losses_are_reported():
     assert losses(PRESET) == []
     assert "TX1 and TX2 fire at once" in losses(parse_cfg(text(3)))[0]
     assert "of 8 virtual antennas 4 are left" in losses(parse_cfg(text(3)))[0]
@@ -78,7 +79,7 @@ def test_orders_that_repeat_are_loops():
 
 @pytest.mark.parametrize("masks", [(1, 4, 2), (1, 1, 4, 4, 2, 2), (2, 1, 1, 4)])
 def test_an_echo_is_where_it_is_however_often_they_fire(masks):
-    """The TDM delays of each chirp are turned back: a closing point's azimuth is the same."""
+    """TDM delays of each chirp are compensated: a closing point's azimuth is the same."""
     config = parse_cfg(text(*masks, loops=32)).model_copy(update={"frame_period": 0.1})
     point = 2.0 * np.array([[np.cos(0.35), np.sin(0.35), 0.0]])
 
@@ -95,14 +96,14 @@ def test_an_echo_is_where_it_is_however_often_they_fire(masks):
 
 # --- binary phase modulation -----------------------------------------------------------------------------------------
 def modulated(config: RadarConfig, apart: np.ndarray) -> np.ndarray:
-    """What the radar would have received, from echoes of each transmitter in each chirp (slot, tx)."""
+    """Received signal from echoes of each transmitter in each chirp (slot, tx)."""
     return np.stack([apart[0, :, 0] + apart[0, :, 1], apart[1, :, 0] - apart[1, :, 1]], axis=1)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.4, -1.1])
 def test_binary_phase_modulation_is_taken_apart(speed):
     """Against the closed form of a moving point's echo: as if each transmitter had fired alone, to -24 dB at any speed
-    (the sidelobes of the antennas are at -25 dB) and to the rounding at rest."""
+    (the antennas' sidelobes are at -25 dB) and to rounding at rest."""
     config = parse_cfg(text(5, 5, loops=32, extra="bpmCfg -1 1 0 1"))
     assert config.tx_order == (0, 2) and config.bpm == (0, 1) and config.loops == 32
     assert parse_cfg(write_cfg(config)) == config and losses(config) == []
@@ -166,7 +167,7 @@ def test_several_subframes_or_bursts_are_refused(given, words):
 
 # --- which board -----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
-    ("line", "board", "said"),
+    ("line", "board", "remarked"),
     [
         ("", "iwr1843boost", True),
         ("% Platform:xWR18xx", "iwr1843boost", False),
@@ -175,11 +176,11 @@ def test_several_subframes_or_bursts_are_refused(given, words):
         ("% Platform:xWR14xx", "iwr1443boost", False),
     ],
 )
-def test_an_assumed_board_is_said(line, board, said):
+def test_an_assumed_board_is_remarked(line, board, remarked):
     given = f"{line}\n{text(1, 4)}"
     config = parse_cfg(given)
     assert config.board == board
-    assert remarks(given, config) == ([assumed_board(config)] if said else [])
+    assert remarks(given, config) == ([assumed_board(config)] if remarked else [])
 
 
 def test_sixty_gigahertz_without_a_board():

@@ -54,7 +54,7 @@ def test_each_limit_is_named(change, message):
 
 
 def test_the_demo_alone_keeps_a_frame_in_memory():
-    """RadarHD's frames of 1.5 MiB were streamed under mmWave Studio."""
+    """RadarHD's frames of 1.5 MiB were streamed with mmWave Studio."""
     check_limits(PRESETS["radarhd"])
     with pytest.raises(InputError, match="frame of 1572864 bytes, expected at most 1048576"):
         check_limits(PRESETS["radarhd"], demo=True)

@@ -131,7 +131,7 @@ def test_the_awr2944():
 
 
 def test_real_samples_are_made_complex():
-    """A tone of the beat of the closed form: its complex samples are those of the same beat at half the rate."""
+    """A tone of known beat frequency: its complex samples have the same beat at half the rate."""
     config = parse_cfg(AWR2944).model_copy(update={"loops": 1})
     n, beat = np.arange(512), 37 / 512
     real = 1000 * np.cos(2 * np.pi * beat * n + 0.7)

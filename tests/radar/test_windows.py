@@ -1,4 +1,4 @@
-"""Windows are those of scipy.signal."""
+"""Windows equal those of scipy.signal."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
-"""Every board's file by a round trip: a sphere at a known place, simulated with the board's front end, is found there
-by the calibrated array. A board is one file, so one that lies outside the package goes the same way."""
+"""Round trip of every board's file: a sphere at a known place, simulated with the board's front end, is located by the
+calibrated array; also for a board's file outside the package."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ from radarsim.receiver.phasenoise import density
 from radarsim.recording.simulate import simulate
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
-from tests.radars import radar, tells_elevation
+from tests.radars import radar, resolves_elevation
 
 PRESET = PRESETS["radarize"]
 MEASURED = tuple((float(k), 0.5) for k in range(12))
@@ -62,18 +62,18 @@ def sphere(azimuth: float, elevation: float) -> Scene:
 
 
 def burst(scene: Scene, config: RadarConfig) -> np.ndarray:
-    """A frame of a radar at rest at the origin."""
+    """Frame of a radar at rest at the origin."""
     return Scenario(scene, Motion.still((0, 0, 0), duration=1.0), config, seed=2).frames(np.zeros(1)).samples
 
 
 def found(config: RadarConfig, samples: np.ndarray) -> tuple[float, float, float]:
-    """Range (m), azimuth and elevation (deg) of the strongest echo: the plane wave that fits its snapshot best, by the
-    definition of its phases."""
+    """Range (m), azimuth and elevation (deg) of the strongest echo, by the best fit of a plane wave to its snapshot,
+    from the definition of its phases."""
     maps = Heatmaps(config)
     spectrum = maps.spectrum(samples)[0].numpy()
     power = (np.abs(spectrum) ** 2).sum(axis=-1) * (abs(maps.ranges - 2.2) < 1.9)[:, None]  # leakage is around zero
     row, column = np.unravel_index(power.argmax(), power.shape)
-    ends = (60, 35 if tells_elevation(config) else 0)
+    ends = (60, 35 if resolves_elevation(config) else 0)
     a, e = np.meshgrid(*(np.deg2rad(np.arange(-end, end + 0.1, 0.5)) for end in ends), indexing="ij")
     towards = np.stack([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)], axis=-1)
     antennas = (tx_positions(config)[:, None] + rx_positions(config)).reshape(-1, 3)
@@ -84,7 +84,7 @@ def found(config: RadarConfig, samples: np.ndarray) -> tuple[float, float, float
 
 @pytest.fixture
 def own(tmp_path) -> Path:
-    """A board's file outside the package."""
+    """Board's file outside the package."""
     (tmp_path / "mine.yaml").write_text(OWN)
     return tmp_path / "mine.yaml"
 
@@ -93,19 +93,19 @@ def own(tmp_path) -> Path:
 @pytest.mark.parametrize("board", [*BOARDS, "mine.yaml"])
 @pytest.mark.parametrize(("azimuth", "elevation"), [(20, 12), (-15, -10)])
 def test_a_target_is_found_where_it_is(own, board, azimuth, elevation):
-    """Within what the channels' errors, 3 deg at most, do to four antennas in a row or two in a column. An array
-    without elevation hears what is level where it is."""
+    """Within the effect of the channels' errors, 3 deg at most, on four antennas in a row or two in a column. An array
+    without elevation gives level directions."""
     config = radar(own if board == "mine.yaml" else board)
-    elevation = elevation if tells_elevation(config) else 0
+    elevation = elevation if resolves_elevation(config) else 0
     distance, left, up = found(config, burst(sphere(azimuth, elevation), config))
     assert distance == pytest.approx(2.5, abs=config.range_resolution)
     assert left == pytest.approx(azimuth, abs=1.5) and up == pytest.approx(elevation, abs=2.0)
 
 
-@pytest.mark.parametrize("board", [name for name in BOARDS if tells_elevation(radar(name))])
+@pytest.mark.parametrize("board", [name for name in BOARDS if resolves_elevation(radar(name))])
 def test_elevation_aware_maps_show_what_is_level(board):
-    """The mean of an elevation pair passes a level echo whole: it reads as in the plain map. With receivers' signs that
-    are not taken off, a pair of the AOP cancels."""
+    """The mean of an elevation pair passes a level echo unattenuated, as in the plain map. With uncorrected receiver
+    signs, a pair of the AOP cancels."""
     config = radar(board)
     maps, samples = Heatmaps(config), burst(sphere(0, 0), config)
     row = abs(maps.ranges - 2.5).argmin()
@@ -121,10 +121,10 @@ NEW = ("awr1642boost", "iwr1443boost", "awr1843aop", "awr2243boost", "awr2944evm
 
 @pytest.mark.parametrize("board", NEW)
 def test_points_of_two_seconds_lie_where_the_target_is(tmp_path, board):
-    """From a .cfg through a recording to the chip's point cloud: azimuth, and elevation where the array tells it."""
+    """From a .cfg through a recording to the chip's point cloud: azimuth, and elevation where the array resolves it."""
     config = radar(board).changed("radar", frame_period=0.25, loops=16)
     (tmp_path / "radar.cfg").write_text(write_cfg(config))
-    elevation = 8 if tells_elevation(config) else 0
+    elevation = 8 if resolves_elevation(config) else 0
     simulate(
         sphere(15, elevation), tmp_path / "a.h5", radar=str(tmp_path / "radar.cfg"), duration=2.0, seed=2,
         trajectory=_still(tmp_path / "still.tum", 24),
@@ -145,7 +145,7 @@ def test_points_of_two_seconds_lie_where_the_target_is(tmp_path, board):
 
 
 def test_a_board_outside_the_package_in_a_recording(own, tmp_path):
-    """From a .cfg that names the file beside it, by `simulate`; the recording needs the file no more."""
+    """From a .cfg that names the file beside it, by `simulate`; the recording contains the board."""
     config = radar(own)
     text = "\n".join(["% Board: mine.yaml", *write_cfg(config).splitlines()[1:]])
     (tmp_path / "radar.cfg").write_text(text)
@@ -166,7 +166,7 @@ def _still(path: Path, count: int = 8) -> Path:
 
 
 def test_a_board_beside_a_specification(own, tmp_path):
-    """A data set's recording is another when what the board's file holds changes."""
+    """The identity of a data set's recording changes with the content of the board's file."""
     (tmp_path / "spec.yaml").write_text(
         "name: a\nbuildings: {o: office}\nrecordings: [{building: o, platform: cart, count: 1, duration: 1}]\n"
         "variants: {x: {radar: {board: mine.yaml, start_frequency: 60e9}}}\n"
@@ -181,7 +181,7 @@ def test_a_board_beside_a_specification(own, tmp_path):
 
 # --- the calibration follows the board -------------------------------------------------------------------------------
 def signs(config: RadarConfig) -> list[int]:
-    """Of TX1's receivers, in the calibration."""
+    """Signs of TX1's receivers in the calibration."""
     return config.calibration[0].real.astype(int).tolist()
 
 
@@ -199,7 +199,7 @@ def test_the_nominal_calibration_is_the_boards():
 
 @pytest.mark.parametrize("pairs", [((1.0, 0.0),) * 12, ((1.0, 0.0), (-1.0, 0.0)) * 6])
 def test_ones_and_signs_are_no_measurement(pairs):
-    """TI's files, and recordings of boards as they were simulated once."""
+    """Calibrations of ones in TI's files, and of nominal signs in older simulated recordings, count as not measured."""
     config = RadarConfig.build("radar", **PRESET.model_dump() | {"board": "iwr6843aop", "channel_calibration": pairs})
     assert config.channel_calibration is None and signs(config) == [1, -1, 1, -1]
 
@@ -214,7 +214,7 @@ def test_importers_and_variants_take_the_boards():
 
 
 def test_the_emulated_radar_is_on_the_board_that_was_asked_for(tmp_path, monkeypatch):
-    """Commands name none."""
+    """Commands name no board; the emulator uses the requested one."""
     (tmp_path / "aop.cfg").write_text(write_cfg(radar("iwr6843aop")))
     written = (tmp_path / "aop.cfg").read_text().splitlines()
     sent = parse_cfg("\n".join(line for line in written if not line.startswith("%")))
@@ -251,7 +251,7 @@ def test_front_ends_of_the_data_sheets(board, eirp, figure, half_azimuth, half_e
 
 @pytest.mark.parametrize(("azimuth", "elevation", "loss"), [(0, 0, 0.0), (65, 0, 6.0), (0, -65, 6.0)])
 def test_echoes_of_the_aop_have_its_gain(azimuth, elevation, loss):
-    """The radar equation with 5 dBi, and 6 dB less either way at the edge of the field of view."""
+    """Radar equation with 5 dBi, and 6 dB less in each direction at the edge of the field of view."""
     config = radar("iwr6843aop")
     point = Scatterers.points(polar(2.0, azimuth, elevation)[None], np.array([0.5]))
     power = np.abs(PathFinder(None, point, None, config)(np.zeros(3), np.eye(3)).amplitude[0]) ** 2

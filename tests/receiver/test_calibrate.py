@@ -1,4 +1,4 @@
-"""Calibration finds what a simulated radar was made of, and says something sensible about real ones."""
+"""Calibration recovers the settings of a simulated radar, and gives plausible ones for real radars."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ CONFIG = PRESETS["radarize"]
 
 
 def record(path, settings, board, config=CONFIG, velocity=(0, 0, 0), targets=((2.6, 12, 3), (3.4, -22, 0))):
-    """Frames of two reflectors in weak clutter, seen by a given board."""
+    """Frames of two reflectors in weak clutter, with a given board."""
     rng = np.random.default_rng(4)
     place = [polar(*t) for t in targets] + [polar(r, a) for r, a in rng.uniform((1, -50), (4, 50), (200, 2))]
     sigma = np.array([0.3, 0.3][: len(targets)] + [1e-6] * 200)
@@ -39,7 +39,7 @@ def record(path, settings, board, config=CONFIG, velocity=(0, 0, 0), targets=((2
 
 
 def without_slope(channel):
-    """A channel's errors as far as they can be told: no slope of the phase over the array, mean gain 1."""
+    """A channel's errors as far as they are observable: no slope of the phase over the array, mean gain 1."""
     phase = np.angle(channel).ravel()
     across = np.array([[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 6, 7]]).ravel()
     up = np.array([0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0])
@@ -51,7 +51,7 @@ def without_slope(channel):
 
 @pytest.mark.parametrize("distance", [0.15, 0.25, 0.35])
 def test_the_mount_is_found(tmp_path, distance):
-    """Distance within 1 cm, amplitudes of all channels within 20 %, and the leakage's level as without a mount."""
+    """Distance within 1 cm, amplitudes of all channels within 20 %, and leakage level as without a mount."""
     settings = FrontEndConfig.of(CONFIG.board, mount=[MountEcho(distance=distance, level_db=-65)])
     front = record(tmp_path / "real.h5", settings, 1)
     found = calibrate(tmp_path / "real.h5", tmp_path / "board.yaml").settings
@@ -99,7 +99,7 @@ def test_a_quiet_board_has_no_leakage(tmp_path):
     )
     found = calibrate(tmp_path / "real.h5", tmp_path / "board.yaml")
     assert found.settings.leakage is None and found.settings.mount is None
-    assert found.settings.mismatch == Mismatch()  # nothing to tell it from
+    assert found.settings.mismatch == Mismatch()  # unobservable here
     assert found.settings.full_scale_dbm == pytest.approx(8.0, abs=0.3)
 
 
@@ -127,7 +127,7 @@ def test_unusable_recordings_are_refused_in_a_sentence(tmp_path):
 
 
 def test_a_mount_explains_what_the_leakage_leaves(captures, tmp_path):
-    """What stands still within 0.4 m of real boards: 1 dB less of it is left unexplained by the front end, or 10."""
+    """Static power within 0.4 m of real boards: the front end leaves 1 dB, or 10, less of it unexplained."""
     for name, path in captures.items():
         settings = calibrate(path, tmp_path / f"{name}.yaml").settings
         with Recording(path) as recording:
@@ -147,12 +147,12 @@ def test_a_mount_explains_what_the_leakage_leaves(captures, tmp_path):
 
 @pytest.fixture
 def captures(recordings, tmp_path):
-    """The public captures as recordings."""
+    """Public captures as recordings."""
     return public.captures(recordings, tmp_path)
 
 
 def test_real_captures_give_boards_that_sound_like_them(captures, tmp_path):
-    """Simulated with its own front-end file, silence has the noise floor and the leakage of the real capture."""
+    """A simulation without echoes, with its own front-end file, has the noise floor and leakage of the real capture."""
     for name, path in captures.items():
         found = calibrate(path, tmp_path / f"{name}.yaml")
         assert -25 < found.settings.full_scale_dbm < 25, name

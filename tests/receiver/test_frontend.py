@@ -1,4 +1,4 @@
-"""Each effect of the front end against its closed form, and against the ideal where it is switched off."""
+"""Each effect of the front end against its closed form, and against the ideal front end when switched off."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ OFF = FrontEndConfig.ideal()
 
 @pytest.mark.parametrize("gain", [24.0, 30.0, 38.0, 48.0])
 def test_noise_by_receive_gain(gain):
-    """k T B F G with the noise figure of the gain."""
+    """k T B F G with the noise figure at the gain."""
     config = CONFIG.model_copy(update={"rx_gain_db": gain})
     counts = FrontEnd(config, FrontEndConfig.ideal(noise=True)).receive(np.zeros(SHAPE, np.complex64), rng())
     watts = 1.380649e-23 * 290 * CONFIG.sample_rate * noise_factor(gain) * 10 ** (gain / 10)
@@ -35,7 +35,7 @@ def test_noise_figure_of_one_measurement_holds_for_every_gain():
 
 @pytest.mark.parametrize("band", [Band(), Band(low=-0.3, flat=0.8, high=1.4)], ids=["default", "wide"])
 def test_noise_folds_as_echoes_do(band):
-    """Its spectrum is that of white noise of the same density at eight times the rate, filtered and decimated."""
+    """Its spectrum equals white noise of the same density at eight times the rate, filtered and decimated."""
     front = FrontEnd(CONFIG, FrontEndConfig.ideal(noise=True, band=band))
     found = sum(power_by_bin(front.receive(np.zeros(SHAPE, np.complex64), np.random.default_rng(k))) for k in range(8))
     white = rng().normal(size=(3000, 8 * N, 2)).view(complex)[..., 0] * np.sqrt(front._bin_noise * N / 2 * 8)
@@ -68,7 +68,7 @@ def test_full_scale_is_a_power():
 
 # --- leakage ---------------------------------------------------------------------------------------------------------
 def test_leakage_level_and_place():
-    """A static tone at slope x delay, at its level behind the high-pass filter, a phase of its own per channel."""
+    """Static tone at slope x delay, at its level after the high-pass filter, with a different phase per channel."""
     delay, level = 8e-9, -50.0
     settings = FrontEndConfig.ideal(leakage=Leakage(level_db=level, delay=delay), high_pass=True)
     counts = FrontEnd(CONFIG, settings, rng()).receive(np.zeros(SHAPE, np.complex64), rng())
@@ -114,7 +114,7 @@ def test_mount_echoes_levels_and_places():
 
 
 def test_mount_belongs_to_the_board():
-    """Amplitudes differ by channel, follow from the board's seed, and spread as complex normal ones of the level."""
+    """Amplitudes differ by channel, follow from the board's seed, and have a complex normal distribution."""
     boards = np.stack([FrontEnd(CONFIG, rng=np.random.default_rng(k)).mount[0] for k in range(400)])
     assert np.array_equal(boards[7], FrontEnd(CONFIG, rng=np.random.default_rng(7)).mount[0])
     assert len(np.unique(np.angle(boards[7]).round(3))) == 12 and not np.isclose(boards[7], boards[8]).any()
@@ -163,7 +163,8 @@ def test_phase_noise_at_one_megahertz():
 
 
 def test_near_echoes_have_no_skirt():
-    """Range correlation: 6 dB less for half the delay; the leakage's skirt is that of its own delay, tiny."""
+    """Range correlation: 6 dB less for half the delay; the leakage's sidebands are those of its own delay,
+    negligible."""
     far, near = skirt(80)[20:40].mean(), skirt(10)[70:90].mean()
     offset = db(law(80, np.arange(20, 40) - 80).mean() / law(10, np.arange(70, 90) - 10).mean())
     assert offset > 15
@@ -187,7 +188,7 @@ def test_phase_noise_is_common_to_the_receivers_of_a_chirp():
 
 
 def test_skirts_below_the_noise_may_be_left_out():
-    """The speed-up for weak echoes takes away less than 1 % of the noise in any bin."""
+    """The speed-up for weak echoes removes less than 1 % of the noise in any bin."""
     settings = FrontEndConfig.ideal(noise=True, phase_noise=PHASE_NOISE)
     weak, plain = (FrontEnd(CONFIG, s).receive(tone(60, -75), rng()) for s in (settings, OFF))
     noise = power_by_bin(weak - plain)
@@ -197,7 +198,7 @@ def test_skirts_below_the_noise_may_be_left_out():
 # --- image -----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("cell", [3, 30, 44])
 def test_image_rejection(cell):
-    """30 dB below the echo at the opposite beat frequency, where nothing filters it."""
+    """30 dB below the echo at the opposite beat frequency, if no filter removes it."""
     counts = FrontEnd(CONFIG, FrontEndConfig.ideal(image_rejection_db=30.0)).receive(tone(cell, -60), rng())
     power = power_by_bin(counts)
     assert db(power[N - cell] / power[cell]) == pytest.approx(-30, abs=0.01)
@@ -216,7 +217,7 @@ def test_complex_sampling_filters_images_away():
 
 # --- channels --------------------------------------------------------------------------------------------------------
 def test_mismatch_statistics():
-    """Within +-0.5 dB and +-3 deg, spread over most of it, a product of TX and RX errors, by the board's seed."""
+    """Within +-0.5 dB and +-3 deg, spread over most of it, as products of TX and RX errors, from the board's seed."""
     boards = np.stack([FrontEnd(CONFIG, rng=np.random.default_rng(k)).channel for k in range(400)])
     gain, phase = 20 * np.log10(np.abs(boards)), np.rad2deg(np.angle(boards))
     assert 0.4 < np.abs(gain).max() <= 0.5 and 2.4 < np.abs(phase).max() <= 3.0
@@ -248,7 +249,7 @@ def test_antenna_pattern():
 
 # --- switches and files ----------------------------------------------------------------------------------------------
 def test_everything_off_is_the_ideal():
-    """Only a scale is left: counts are the signal times the full-scale factor, to float32."""
+    """Only a scale factor remains: counts are the signal times the full-scale factor, to float32."""
     signal = (rng().normal(size=(*SHAPE, 2)) * 1e-4).astype(np.float32).view(np.complex64)[..., 0]
     front = FrontEnd(CONFIG, OFF)
     scale = 32767 * 10 ** ((CONFIG.rx_gain_db - 5 + 12 - CONFIG.tx_backoff_db) / 20)
@@ -272,7 +273,7 @@ def test_everything_off_is_the_ideal():
     ids=lambda s: next(iter(s)),
 )
 def test_each_switch_does_something_alone(switch):
-    """With everything on but one, the samples differ from those with everything on."""
+    """With all effects but one, the samples differ from those with all effects."""
     name = next(iter(switch))
     on = FrontEnd(CONFIG, rng=rng())
     off = FrontEnd(CONFIG, FrontEndConfig.of(CONFIG.board, **switch), rng())
@@ -289,7 +290,7 @@ def test_parts_by_cause_add_up():
     """With noise off, what each signal makes and the leakage are together what the front end makes of their sum."""
     front = FrontEnd(CONFIG, FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None), rng())
     signals = [tone(3, -60), tone(30.3, -70), tone(70.9, -80)]
-    parts, whole = front.by_cause(signals), front.receive(np.sum(signals, axis=0), rng())
+    parts, whole = front.by_path_type(signals), front.receive(np.sum(signals, axis=0), rng())
     assert len(parts) == 4
     assert np.abs(np.sum(parts, axis=0) - whole).max() < 1e-5 * np.abs(whole).max()
 

@@ -1,4 +1,4 @@
-"""What other radars send, against both waveforms multiplied in small steps and against closed forms."""
+"""Interference, against both waveforms multiplied in small steps and against closed forms."""
 
 import json
 
@@ -20,7 +20,7 @@ from radarsim.world.scene import Scene
 
 
 def signal(*others: dict, time: float = 0.0, **changes) -> np.ndarray:
-    """What they add to a frame: (loop, tx, rx, sample)."""
+    """Interference in a frame: (loop, tx, rx, sample)."""
     made = scenario(*others, **changes)
     return made.interference(made.motion, time)
 
@@ -46,7 +46,7 @@ GHOST = {"start": 8e-9}  # its chirps begin as ours do, but for a beat within th
     ("distance", "bearing", "gains"), [(1, 0, BOTH), (4, 0, BOTH), (4, 28, BOTH - 3), (2, -50, BOTH - 6)]
 )
 def test_power_is_friis(distance, bearing, gains):
-    """P G G' (lambda / 4 pi d)^2 with both patterns, over the transmitted power; and no more of what backs off."""
+    """P G G' (lambda / 4 pi d)^2 with both patterns, relative to the transmitted power, and reduced by the back-off."""
     board = FrontEndConfig.ideal(band=Band(), antenna=FrontEndConfig.of(CONFIG.board).antenna)
     for backoff in (0, 6):
         radar = {"loops": 8, "tx_backoff_db": backoff}
@@ -62,7 +62,7 @@ def test_boards_that_look_away_do_not_hear():
 
 @pytest.mark.parametrize("difference", [0.5e12, 2e12, 10e12, -30e12])
 def test_energy_of_a_crossing(difference):
-    """A chirp spends |H|^2 df / |S - S'| at each frequency, however short that is beside a sample."""
+    """A chirp has the energy |H|^2 df / |S - S'| at each frequency, even if it is shorter than a sample."""
     slope = CONFIG.slope - difference
     early = 25e-6 * difference / slope  # so that they cross in the middle of the window
     board = FrontEndConfig.ideal(band=Band(low=-0.03, high=0.96))  # nothing folds
@@ -74,7 +74,7 @@ def test_energy_of_a_crossing(difference):
 
 
 def test_duration_of_a_crossing():
-    """IF bandwidth over slope difference: a stripe of so many samples."""
+    """IF bandwidth over slope difference gives the number of disturbed samples."""
     difference = 0.25e12
     found = np.abs(signal(facing(3, radar={"slope": CONFIG.slope - difference, "loops": 8}, start=-75e-9))[0, 0, 0])
     half = CONFIG.sample_rate * (0.03 + 0.975)  # between the points of half the amplitude
@@ -84,13 +84,13 @@ def test_duration_of_a_crossing():
 
 # --- place -----------------------------------------------------------------------------------------------------------
 def ghost_range(found: np.ndarray) -> float:
-    """Of the strongest tone, m."""
+    """Range of the strongest tone, m."""
     window = np.hanning(CONFIG.samples)
     return np.abs(np.fft.fft(found * window, 64 * CONFIG.samples)).argmax() / 64 * CONFIG.range_resolution
 
 
 def test_like_chirps_make_a_ghost():
-    """At half the way that the other's chirps are late by; it drifts by as much as the clocks do."""
+    """A chirp of equal slope gives a ghost at half the delay between the chirps; it drifts with the clock error."""
     for start, distance in ((5e-9, 1.0), (-2e-9, 3.0)):
         found = signal(facing(distance, start=start))
         expected = (SPEED_OF_LIGHT * start + distance) / 2
@@ -107,8 +107,8 @@ def test_like_chirps_make_a_ghost():
     [(GHOST, CONFIG.adc_center_time), ({"start": -0.4e-6, "radar": {"slope": 78e12, "loops": 8}}, 16e-6)],
 )
 def test_direction_is_the_others_bearing(bearing, fields, crossing):
-    """Over the receivers its phase turns as that of an echo from there, of the frequency at which it crosses: left is
-    left."""
+    """Its phase over the receivers is that of an echo from the interferer's direction at the crossing frequency: left
+    is left."""
     found = signal(facing(6, bearing, **fields))
     turn = np.angle(np.vdot(found[..., :-1, :], found[..., 1:, :])) / (2 * np.pi)
     wavelength = SPEED_OF_LIGHT / (CONFIG.start_frequency + CONFIG.slope * crossing)
@@ -116,7 +116,7 @@ def test_direction_is_the_others_bearing(bearing, fields, crossing):
 
 
 def test_it_comes_in_by_the_receivers():
-    """Its level and phase do not hang on which of our transmitters is on; receivers' errors stay in it."""
+    """Its level and phase do not depend on the active transmitter; receivers' errors are included."""
     board = FrontEndConfig.ideal(band=Band(), mismatch={"gain_db": 6, "phase_deg": 90})
     made = scenario(facing(3, **GHOST), front_end=board)
     counts = made.board.receive(made.interference(made.motion, 0.0), np.random.default_rng(0))
@@ -131,7 +131,7 @@ def wall(material: str) -> dict:
 
 
 def test_walls_stand_in_the_way():
-    """Metal stops it, glass lets some through, and somebody who walks by stops it for a while."""
+    """Metal blocks it, glass transmits part of it, and a person who walks by blocks it for a while."""
     other = facing(4, **GHOST)
     free = np.abs(signal(other)).max()
     assert not signal(other, objects=[wall("metal")]).any()
@@ -172,7 +172,7 @@ def test_frames_are_functions_of_their_instants():
 
 
 def test_who_sends_elsewhere_changes_nothing():
-    """In another band, or not yet: the samples are those without."""
+    """An interferer in another band, or one that has not started, does not change the samples."""
     plain = walk()
     expected = plain.frames(plain.times[:2]).samples
     for other in ({"radar": {"start_frequency": 60e9, "board": "iwr6843isk"}}, {"start": 0.5}):
@@ -181,17 +181,17 @@ def test_who_sends_elsewhere_changes_nothing():
 
 
 def test_the_pipeline_leaves_such_chirps_out(tmp_path):
-    """A recording says who sent, and the chirps that the pipeline leaves out are those that were crossed."""
+    """A recording lists the interferers, and the chirps that the pipeline leaves out are those that were disturbed."""
     scene = Scene.of(ROOM | {"interferers": [ROBOT]}, "room")
     config = PRESETS["radarize"]
     places = np.array([[0.0, 0.0], [0.8, 0.1]])
     path = simulate(scene, tmp_path / "x.h5", duration=0.4, waypoints=places, seed=2, sensors=["adc-by-cause"])
     with Recording(path) as recording:
         samples, valid = recording.adc(0, len(recording)), recording.valid(0, len(recording))
-        (said,) = json.loads(recording.attributes["interferers"])
+        (stated,) = json.loads(recording.attributes["interferers"])
         parts = recording.read("truth/adc_by_cause")
         about = recording.describe("truth/adc_by_cause")["about"]
-    assert (said["name"], said["velocity"], said["radar"]["slope"]) == ("robot", [-0.5, 0.0, 0.0], 60e12)
+    assert (stated["name"], stated["velocity"], stated["radar"]["slope"]) == ("robot", [-0.5, 0.0, 0.0], 60e12)
     assert about.endswith("interference, leakage")
     found = find_flaws(samples, valid).disturbed
     window = np.hanning(config.samples)[:, None]  # what falls into its ends harms nobody, and is not looked for

@@ -1,4 +1,4 @@
-"""The paper's figure: the static world draws v cos(phi - theta) into the Doppler-azimuth map of a moving radar."""
+"""The paper's figure: in the Doppler-azimuth map of a moving radar the static world appears at v cos(phi - theta)."""
 
 import numpy as np
 import pytest

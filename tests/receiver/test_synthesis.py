@@ -20,7 +20,7 @@ def error_db(found, truth):
 
 
 def cloud(rng, n):
-    """Point echoes all around in front, a quarter of them ghosts whose two legs differ."""
+    """Point echoes all around in front, a quarter of them ghosts with different paths out and back."""
     place = rng.uniform([0.3, -2.5, -1.2], [4.2, 2.5, 1.2], (n, 3))
     points = np.repeat(place[:, None], 2, axis=1)
     points[: n // 4, 1] += rng.uniform(-1, 1, (n // 4, 3))
@@ -39,14 +39,14 @@ def test_against_brute_force():
 
 
 def test_against_direct_sum():
-    """The same path-length parabolas summed directly: what the expansion itself leaves out."""
+    """Against a direct sum over the same path-length parabolas: error of the expansion."""
     echoes = cloud(np.random.default_rng(2), 300)
     lengths = echoes.lengths(CONFIG, FAST, 0.0)
     assert error_db(Synthesizer(CONFIG)(lengths, echoes.amplitude), direct_sum(CONFIG, lengths, echoes.amplitude)) < -60
 
 
 def test_the_direct_sum_itself():
-    """What parabolas leave out."""
+    """Error of the path-length parabolas."""
     echoes = cloud(np.random.default_rng(2), 25)
     truth = beat(CONFIG, FAST, 0.2, echoes.points, echoes.amplitude)
     assert error_db(direct_sum(CONFIG, echoes.lengths(CONFIG, FAST, 0.2), echoes.amplitude), truth) < -55

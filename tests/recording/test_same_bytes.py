@@ -1,4 +1,4 @@
-"""A recording is a function of its scenario: however it is made, all that it holds is the same to the byte.
+"""A recording is a function of its scenario: its bytes do not depend on how it is made.
 
 Batches, processes, kills, a cluster and sensors that are added later do not matter; neither does the order of frames.
 """
@@ -22,7 +22,7 @@ from radarsim.dataset.run import INDEX, make
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
 from radarsim.recording import batches
-from radarsim.recording.add_sensors import accompany
+from radarsim.recording.add_sensors import add_sensors
 from radarsim.recording.batches import Batches
 from radarsim.recording.simulate import planned, simulate
 from radarsim.scenario import Scenario
@@ -35,14 +35,14 @@ COUNT = 6
 
 @pytest.fixture(scope="module")
 def specification(tmp_path_factory) -> Path:
-    """Of two recordings with all sensors; the radar swings on an arm."""
+    """Two recordings with all sensors; the radar swings on an arm."""
     arm = {"arm": {"mounting": [0.2, 0.05, 0.1, 2, 3, -1]}}
     walks = {"recordings": hall.recordings(["cart", "robot"]), "sensors": "all", "storage": "heatmaps"}
     return hall.write(tmp_path_factory.mktemp("specification"), variants=arm, **walks)
 
 
 def plan_of(task: Task) -> dict[str, object]:
-    """Arguments of `simulate` for the recording that a data set's task makes."""
+    """Arguments of `simulate` for a data set task's recording."""
     way = {"platform": task.platform, "duration": task.duration, "waypoints": np.array(task.waypoints)}
     same = {"scene": task.scene, "seed": task.seed, "radar": task.radar, "sensors": task.sensors}
     return way | same | {"mounting": task.variant.mounted}
@@ -50,13 +50,13 @@ def plan_of(task: Task) -> dict[str, object]:
 
 @pytest.fixture(scope="module")
 def plan(specification) -> dict[str, object]:
-    """Of the first recording."""
+    """Plan of the first recording."""
     return plan_of(Specification.load(specification).tasks[0])
 
 
 @pytest.fixture(scope="module")
 def expected(plan, tmp_path_factory) -> Path:
-    """All of its frames in one batch, by this process and all its threads; all others must come out the same."""
+    """All frames in one batch, by this process with all threads; the reference for all others."""
     path = simulate(output=tmp_path_factory.mktemp("expected") / "whole.h5", **plan)
     with Recording(path) as recording:
         assert len(recording) == COUNT <= batches.TOGETHER
@@ -69,20 +69,20 @@ def scenario(plan) -> Scenario:
 
 
 def parts(path: Path) -> dict[str, object]:
-    """What a recording holds: attributes, and data sets with their descriptions."""
+    """Contents of a recording: attributes, and data sets with their descriptions."""
     with Recording(path) as recording:
         data = {name: (recording.describe(name), recording.read(name).tobytes()) for name in recording.names()}
         return data | {f"attribute {name}": value for name, value in recording.attributes.items()}
 
 
 def differences(found: Path, expected: Path) -> list[str]:
-    """Names of what two recordings do not have in common."""
+    """Names of the parts in which two recordings differ."""
     one, other = parts(found), parts(expected)
     return sorted(name for name in one.keys() | other.keys() if str(one.get(name)) != str(other.get(name)))
 
 
 def agree(found: Path, expected: Path) -> bool:
-    """Whether all data sets of a recording are those of one with more sensors."""
+    """Whether all data sets of a recording equal those of one with more sensors."""
     whole = parts(expected)
     return all(whole[name] == part for name, part in parts(found).items() if not name.startswith("attribute"))
 
@@ -91,14 +91,14 @@ Way = Callable[[dict, Path, pytest.MonkeyPatch], object]
 
 
 def frame_by_frame(plan, path, monkeypatch):
-    """Of a scene at hand; for so few frames, no process beside this one pays."""
+    """From a scene object; for so few frames only this process is used."""
     monkeypatch.setattr(batches, "TOGETHER", 1)
     monkeypatch.setattr(batches, "perform", None)
     simulate(output=path, workers=None, **plan | {"scene": Scene.load(plan["scene"])})
 
 
 def by_two_processes(plan, path, monkeypatch):
-    """In batches of two; this process makes none, however short it is, and the others do not outlive the recording."""
+    """In batches of two; this process computes none, and the others do not outlive the recording."""
     monkeypatch.setattr(batches, "TOGETHER", 2)
     monkeypatch.setattr(Batches, "made", None)
     simulate(output=path, workers=2, **plan)
@@ -106,7 +106,7 @@ def by_two_processes(plan, path, monkeypatch):
 
 
 def after_a_kill(plan, path, monkeypatch):
-    """Without making anew what is there, but for two frames that are compared."""
+    """Resumed without computing existing frames again, except two for comparison."""
     monkeypatch.setattr(batches, "TOGETHER", 2)
     until_killed(plan, path, 4)
     asked: list[np.ndarray] = []
@@ -117,17 +117,17 @@ def after_a_kill(plan, path, monkeypatch):
 
 
 def with_sensors_added_later(plan, path, monkeypatch):
-    """Those that look at the radar's echoes and samples, too."""
+    """Including sensors that use the radar's echoes and samples."""
     simulate(output=path, **plan | {"sensors": ()})
-    accompany(path, planned(**plan)[0], chosen(plan["sensors"]))
+    add_sensors(path, planned(**plan)[0], chosen(plan["sensors"]))
 
 
 class Killed(Exception):
-    """Stands for the end of the process: the file is left as it lies on the disk then."""
+    """Substitute for the end of the process: the file stays as it is on the disk at that time."""
 
 
 def until_killed(plan: dict, path: Path, frames: int) -> None:
-    """What a run leaves that is killed after so many frames."""
+    """Partial recording of a run that is killed after a number of frames."""
     part, left = path.with_name(path.name + ".part"), path.with_name("left")
 
     def progress(done: int, _: int) -> None:
@@ -152,7 +152,7 @@ def test_a_recording_made_another_way(way: Way, plan, expected, tmp_path, monkey
 
 
 def test_frames_in_any_order(scenario, expected):
-    """Backwards, two at a time: samples, and what all sensors see."""
+    """Backwards, two at a time: samples, and rows of all sensors."""
     suite, times, firsts = Suite(scenario), scenario.times, range(0, COUNT, 2)
     frames = {k: scenario.frames(times[k : k + 2]) for k in reversed(firsts)}
     rows = {k: suite.observe(each, k) for k, each in frames.items()}
@@ -174,7 +174,7 @@ def test_sensors_do_not_change_each_other_but_the_seed_does(plan, expected, tmp_
 
 @pytest.mark.parametrize("other", ["seed", "world"])
 def test_what_another_run_has_left_is_not_gone_on_with(other, plan, expected, tmp_path, monkeypatch):
-    """Of another seed, and of another world of the same name, which only its frames tell."""
+    """A partial recording of another seed, or of another world of the same name, detected by its frames."""
     monkeypatch.setattr(batches, "TOGETHER", 2)
     plan = plan | {"sensors": ()}
     (tmp_path / "hall.yaml").write_text("".join(line for line in hall.HALL.splitlines(True) if "pipe" not in line))
@@ -184,7 +184,7 @@ def test_what_another_run_has_left_is_not_gone_on_with(other, plan, expected, tm
 
 @pytest.fixture(scope="module")
 def maps(specification, plan, expected, tmp_path_factory) -> dict[str, Path]:
-    """What the data set must be: heat maps of the recordings that `simulate` makes."""
+    """Data set with heat maps of the recordings that `simulate` makes."""
     folder = tmp_path_factory.mktemp("maps")
     first, second = Specification.load(specification).tasks
     whole = {first.name: expected, second.name: simulate(output=folder / "second.h5", **plan_of(second))}
@@ -198,7 +198,7 @@ def same(folder: Path, maps: dict[str, Path]) -> None:
 
 
 def test_a_data_set_that_was_killed(specification, maps, tmp_path, capsys):
-    """The process and its worker, in the middle of the second recording; the first one is kept."""
+    """The process and its worker are killed in the second recording; the first one is kept."""
     typed = ["dataset", str(specification), "-o", str(tmp_path), "--workers", "1"]
     command = [sys.executable, "-m", "radarsim.cli", *typed]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -213,9 +213,9 @@ def test_a_data_set_that_was_killed(specification, maps, tmp_path, capsys):
     stamp = first.stat().st_mtime_ns
     with pytest.raises(SystemExit) as ended:
         run(app, "radarsim", typed)
-    said = capsys.readouterr()
-    assert ended.value.code == 0, said.err
-    assert "1 recordings made, 1 were there" in said.out and f"{second.stem}: " in said.out
+    printed = capsys.readouterr()
+    assert ended.value.code == 0, printed.err
+    assert "1 recordings made, 1 already there" in printed.out and f"{second.stem}: " in printed.out
     assert first.stat().st_mtime_ns == stamp
     same(tmp_path, maps)
 
@@ -223,7 +223,7 @@ def test_a_data_set_that_was_killed(specification, maps, tmp_path, capsys):
 def test_a_data_set_by_a_ray_cluster(cluster, specification, maps, tmp_path):
     seen = []
     outcome = make(
-        Specification.load(specification), tmp_path, ray=cluster, progress=lambda *p: seen.append(p), say=lambda _: None
+        Specification.load(specification), tmp_path, ray=cluster, progress=lambda *p: seen.append(p), log=lambda _: None
     )
     assert len(outcome.made) == 2 and seen[-1] == (2 * COUNT, 2 * COUNT)
     same(tmp_path, maps)

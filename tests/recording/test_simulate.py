@@ -1,4 +1,4 @@
-"""Whole recordings from the simulator: readable, and true to their own truth."""
+"""Whole simulated recordings: readable, and consistent with their ground truth."""
 
 from multiprocessing import active_children
 from pathlib import Path
@@ -14,7 +14,7 @@ from radarsim.motion.planner import plan_motion
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording.simulate import simulate
-from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.by_path_type import PARTS
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
@@ -27,7 +27,7 @@ def walk(tmp_path_factory):
     return simulate("office", tmp_path_factory.mktemp("sim") / "walk.h5", duration=0.17, seed=6)
 
 
-def test_the_recording_says_what_it_is(walk):
+def test_the_recording_describes_itself(walk):
     with Recording(walk) as recording:
         assert len(recording) == 5
         assert recording.attributes["scene"] == "office" and recording.attributes["seed"] == 6
@@ -81,7 +81,7 @@ def test_iq_by_cause_adds_up(tmp_path):
         adc = recording.adc(0, len(recording)).astype(np.float32)
         about = recording.describe("truth/adc_by_cause")["about"]
         count = recording.read("truth/echoes")
-    assert parts.shape == (len(adc), len(CAUSES), *adc.shape[1:])
+    assert parts.shape == (len(adc), len(PARTS), *adc.shape[1:])
     assert all(p.name.lower() in about for p in PathType) and "leakage" in about
     inside = np.abs(adc).max(axis=-1, keepdims=True) < 32767
     error = (parts.sum(axis=1) - adc) * inside
@@ -94,7 +94,7 @@ def test_iq_by_cause_adds_up(tmp_path):
 
 @pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
 def test_large_scenes_can_be_walked(name, size):
-    """The benchmark's buildings have their size, but for corners out of square, and a tour through them."""
+    """The benchmark's buildings have their size, up to corners out of square, and a tour through them."""
     scene = Scene.load(name)
     assert np.ptp(scene.bounds, axis=0)[:2] == pytest.approx(size, rel=0.005)
     assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0
@@ -118,7 +118,7 @@ def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
     assert not (tmp_path / "x.h5").exists()
 
 
-def test_what_fails_in_another_process_is_said_here(tmp_path):
+def test_failures_of_another_process_are_reported(tmp_path):
     (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
     far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     with pytest.raises(InputError, match="scene away: no frame has an echo"):

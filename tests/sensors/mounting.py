@@ -1,4 +1,4 @@
-"""Radars to put sensors beside, and frames of which only the times matter."""
+"""Radars with sensors beside them, and frames of which only the times matter."""
 
 import numpy as np
 import trimesh
@@ -25,13 +25,13 @@ def box(name: str, low, high, material: str = "concrete") -> SceneObject:
 
 
 def beside(motion: Motion, *objects: SceneObject, movers=(), config=CONFIG, seed: int = 0) -> Scenario:
-    """A radar to put sensors beside, far from the one thing that every scene needs."""
+    """Radar for a sensor beside it, far from the scene's only object."""
     scene = Scene("test", [box("far", [900, 900, 900], [901, 901, 901]), *objects], movers)
     return Scenario(scene, motion, config, seed=seed)
 
 
 def rows(sensor: Sensor, start: int, stop: int) -> dict[str, np.ndarray]:
-    """What a sensor gives for frames start...stop-1."""
+    """Rows of a sensor for frames start...stop-1."""
     return sensor.observe(sensor.scenario.frames(np.arange(start, stop) * sensor.scenario.config.frame_period))
 
 
@@ -41,7 +41,7 @@ def stream(sensor: Sensor, name: str, count: int, batch: int = 8) -> np.ndarray:
 
 
 def tumble(duration: float, rng: np.random.Generator) -> Motion:
-    """Walking pace with lively turns about all axes, and a lever arm."""
+    """Motion at walking pace with fast rotations about all axes, and a lever arm."""
     times = np.arange(-1.0, duration + 2, 0.25)
     place = np.cumsum(rng.normal(0, 0.12, (len(times), 3)), axis=0)
     turn = Rotation.from_rotvec(np.cumsum(rng.normal(0, 0.15, (len(times), 3)), axis=0))

@@ -1,4 +1,4 @@
-"""The depth camera against Open3D's ray casts, and its errors against their laws."""
+"""Depth camera against Open3D's ray casts, and its errors against their laws."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def test_depth_is_that_of_open3d(office, camera):
 
 
 def test_it_looks_where_the_radar_looks():
-    """Left is left and up is up: a block to the left and above is in the upper left of the picture."""
+    """A block to the left and above is in the upper left of the picture."""
     block = box("block", [2, 0.3, 1.3], [2.2, 0.7, 1.6])
     depth = DepthCamera(beside(Motion.still((0, 0, 1)), block)).depth(NOW)[0]
     v, u = np.nonzero(np.isfinite(depth))
@@ -82,8 +82,8 @@ def test_glass_is_looked_through_and_people_are_seen():
 
 
 @pytest.mark.parametrize("clear, seen", [(True, 4.0), (False, 2.0)])
-def test_what_light_passes_is_said_by_the_material(clear, seen):
-    """A pane of one's own is looked through where its material is clear; a screen's black front never is."""
+def test_transparency_follows_from_the_material(clear, seen):
+    """A pane is transparent if its material is clear; a screen's black front never is."""
     own = Custom(permittivity=2.6, thickness=3e-3, clear=clear).material("own")
     pane, wall = box("pane", [2, -3, 0], [2.01, 3, 3], "glass"), box("wall", [4, -3, 0], [4.2, 3, 3])
     camera = DepthCamera(beside(Motion.still((0, 0, 1)), replace(pane, material=own), wall))
@@ -103,14 +103,14 @@ def test_noise_grows_with_the_square_of_the_distance(distance):
     assert measured[seen].std() == pytest.approx(np.hypot(expected, 1e-3 / np.sqrt(12)), rel=0.08)
     assert measured[seen].mean() == pytest.approx(distance, rel=0.01)
     # The strip at the left that only the left imager sees is a baseline wide.
-    blind = stereo.baseline / distance * QUARTER.fx
+    hidden = stereo.baseline / distance * QUARTER.fx
     empty = np.flatnonzero(seen.mean(axis=(0, 1)) == 0)
-    assert len(empty) == pytest.approx(blind, abs=1) and (not len(empty) or empty.max() == len(empty) - 1)
+    assert len(empty) == pytest.approx(hidden, abs=1) and (not len(empty) or empty.max() == len(empty) - 1)
     assert seen[..., len(empty) :].mean() == pytest.approx(1 - stereo.dropout, abs=2e-3)
 
 
 def test_things_cast_a_shadow_on_their_left():
-    """Between left and right imager a thing at 1 m before a wall at 2 m hides baseline (1/1 - 1/2) f of the wall."""
+    """An object at 1 m in front of a wall at 2 m hides baseline (1/1 - 1/2) f of the wall from one of the imagers."""
     depth = np.full((1, 60, 848), 2.0)
     depth[:, :, 400:500] = 1.0
     camera = Intrinsics.of_view(848, 60, np.deg2rad(90), np.deg2rad(20))

@@ -1,4 +1,4 @@
-"""Maps by cause against the heat maps of the I/Q by cause."""
+"""Maps by path type against the heat maps of the I/Q by path type."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from radarsim.motion.walk import Walk
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
-from radarsim.sensors.causes import CAUSES, AdcByCause
+from radarsim.sensors.by_path_type import PARTS, AdcByPathType
 from radarsim.sensors.ghosts import NOISE, Ghosts
 from radarsim.sensors.scan import AZIMUTHS
 from radarsim.world.scene import Scene
@@ -19,12 +19,12 @@ CONFIG = PRESETS["radarize"]
 
 @pytest.fixture(scope="module")
 def seen():
-    """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
+    """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by path type)."""
     scene = Scene.load("visitors")
     motion = Walk("handheld", 5.0).through(scene, 5)
     scenario = Scenario(scene, motion, CONFIG, FrontEndConfig.of(CONFIG.board, mismatch=None), seed=1)
     sensor, frames = Ghosts(scenario), scenario.frames(np.array([1.4, 2.9, 4.1]))
-    iq = AdcByCause(scenario).observe(frames)["truth/adc_by_cause"].astype(np.float32)
+    iq = AdcByPathType(scenario).observe(frames)["truth/adc_by_cause"].astype(np.float32)
     maps = Heatmaps(CONFIG, azimuths=AZIMUTHS)
     reference = np.stack([maps.range_azimuth(part).numpy() for part in iq])
     return sensor, sensor.observe(frames), reference
@@ -56,17 +56,17 @@ def test_the_label_is_the_strongest_cause(seen):
     clear = (top_two[:, 1] > 10 * top_two[:, 0]) & (rows["truth/cause"] != NOISE)
     assert clear.mean() > 0.1
     assert np.mean(rows["truth/cause"][clear] == reference.argmax(axis=1)[clear]) > 0.97
-    assert set(np.unique(rows["truth/cause"])) <= {*range(len(CAUSES)), NOISE}
+    assert set(np.unique(rows["truth/cause"])) <= {*range(len(PARTS)), NOISE}
     # The leakage rules the first bins, but for what stands right before the radar.
-    assert np.mean(rows["truth/cause"][:, 1:3] == CAUSES.index("leakage")) > 0.6
+    assert np.mean(rows["truth/cause"][:, 1:3] == PARTS.index("leakage")) > 0.6
 
 
 def test_cells_below_the_noise_are_noise(seen):
-    """The level it takes for noise is that of a map of noise alone."""
+    """The noise threshold is the level of a map of noise only."""
     sensor, rows, reference = seen
     rng = np.random.default_rng(0)
     empty = sensor.scenario.board.receive(np.zeros(CONFIG.frame_shape[:-1], np.complex64), rng)
-    leakage = sensor.scenario.board.by_cause([])[0]
+    leakage = sensor.scenario.board.by_path_type([])[0]
     quiet = empty - leakage
     adc = np.stack([quiet.real, quiet.imag], axis=-1).astype(np.float32)[None]
     level = Heatmaps(CONFIG, azimuths=AZIMUTHS).range_azimuth(adc)[0].numpy()[30:70]

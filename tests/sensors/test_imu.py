@@ -34,7 +34,7 @@ def test_centripetal_force_at_the_lever_arm():
 
 
 def integrate(imu: Imu, here: Motion, dt: float, duration: float) -> tuple[float, float]:
-    """Strapdown integration of exact samples, written from the definitions: errors at its end, m and rad."""
+    """Strapdown integration of exact samples, from the definitions: final errors, m and rad."""
     times = np.arange(0, duration, dt)
     force, turn = imu.truth(times)
     attitude, position = here.rotation(times[:1])[0], here.position(times[:1])[0]
@@ -54,7 +54,8 @@ def integrate(imu: Imu, here: Motion, dt: float, duration: float) -> tuple[float
 
 
 def test_it_integrates_back_to_the_trajectory():
-    """Ten seconds of tumbling: centimetres from 200 samples a second, and less with the step's square."""
+    """Ten seconds of tumbling: errors of centimetres from 200 samples per second, decreasing with the square of the
+    step."""
     motion = tumble(10.0, np.random.default_rng(2))
     imu = Imu(beside(motion))
     way, turn = integrate(imu, motion.mounted(MOUNT), 1 / RATE, 10.0)
@@ -65,7 +66,7 @@ def test_it_integrates_back_to_the_trajectory():
 
 @pytest.mark.parametrize("errors", [ACCELEROMETER, GYROSCOPE])
 def test_allan_deviation_is_as_specified(errors):
-    """Noise, instability and random walk each where they rule, over 27 runs of 15 minutes."""
+    """Noise, instability and random walk each where they dominate, over 27 runs of 15 minutes."""
     size, runs = int(900 * RATE), 27
     averages = (1, 4, 20, 200, 2000, 20000)
     variance = np.zeros(len(averages))
@@ -83,7 +84,7 @@ def test_allan_deviation_is_as_specified(errors):
     assert 0.5 * errors.instability < expected[-1] < 2 * errors.instability
 
 
-def test_the_bias_is_told():
+def test_the_bias_is_estimated():
     imu = Imu(beside(Motion.still((0, 0, 1), duration=30)))
     seen = rows(imu, 0, 900)
     found = np.hstack([seen["imu/accelerometer"], seen["imu/gyroscope"]]) - [0, 0, STANDARD_GRAVITY, 0, 0, 0]

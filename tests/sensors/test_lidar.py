@@ -1,4 +1,4 @@
-"""The lidar beside the radar against closed forms: a wall, a post to the left, what lies outside its slab."""
+"""Lidar beside the radar against closed forms: a wall, a post to the left, objects outside its slab."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def picture(motion: Motion, *objects) -> np.ndarray:
 
 @pytest.mark.parametrize(("pitch", "roll"), [(0, 0), (0.15, -0.2)])
 def test_a_wall_is_where_it_is(pitch, roll):
-    """On every azimuth at its own distance, whatever the sensor's tilt, and never behind it."""
+    """On every azimuth at the correct distance, at any tilt of the sensor, and never behind the wall."""
     found = picture(Motion.still((0, 0, 1), pitch=pitch, roll=roll), WALL)
     for column, azimuth in enumerate(polar.BEAM_AZIMUTHS):
         rows = np.flatnonzero(found[:, column])

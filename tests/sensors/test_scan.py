@@ -19,7 +19,7 @@ def label(motion, *objects, config=CONFIG):
 
 
 def test_a_wall_is_where_it_is():
-    """Before it free, behind it unknown, whatever the sensor's tilt: the plane is level."""
+    """Free in front of the wall, unknown behind it, at any tilt of the sensor: the plane is horizontal."""
     for pitch, roll in ((0, 0), (0.15, -0.2)):
         states = label(Motion.still((0, 0, 1), pitch=pitch, roll=roll), WALL)
         for column, azimuth in enumerate(AZIMUTHS):
@@ -78,7 +78,7 @@ def test_labels_agree_with_the_depth_camera():
 
 
 def test_rotation_is_taken_from_the_boresight():
-    """Turned to the left, the sensor has the wall's nearest point on its right."""
+    """For a sensor rotated to the left, the wall's nearest point is on its right."""
     states = label(Motion.still((0, 0, 1), yaw=np.deg2rad(20)), WALL)
     surface = states == Cell.SURFACE
     first = np.where(surface.any(axis=0), surface.argmax(axis=0), len(states))

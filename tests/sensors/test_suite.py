@@ -1,4 +1,4 @@
-"""Recordings with all sensors: documented, whole after a crash."""
+"""Recordings with all sensors: documented, and whole after a crash."""
 
 import json
 
@@ -16,7 +16,7 @@ from radarsim.sensors.suite import SENSORS, chosen
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory):
-    """Not half a second of the office with every sensor."""
+    """Less than half a second of the office with every sensor."""
     return simulate("office", tmp_path_factory.mktemp("all") / "walk.h5", duration=0.4, seed=2, sensors=["all"])
 
 

@@ -1,4 +1,4 @@
-"""The tracking camera: smooth, upright, and slowly off."""
+"""Tracking camera: smooth, level, with slow drift."""
 
 import numpy as np
 import pytest

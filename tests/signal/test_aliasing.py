@@ -1,4 +1,4 @@
-"""Windows of speeds told by transmitters' turns: of single points, whose speeds are known."""
+"""Resolution of Doppler ambiguity from phase steps between transmitters, for single points of known speed."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SPAN = 2 * CONFIG.max_velocity
 
 
 def frame(velocity, config=CONFIG, noise=5.0):
-    """Points ahead, from a radar that moves evenly."""
+    """Points ahead of a radar in uniform motion."""
     azimuths, ranges = np.radians(np.linspace(-55, 55, 60)), np.random.default_rng(4).uniform(0.8, 4.0, 60)
     points = np.stack([ranges * np.cos(azimuths), ranges * np.sin(azimuths), np.zeros(60)], axis=1)
 
@@ -39,7 +39,7 @@ def test_every_echo_is_in_the_window(velocity):
     assert spans.any() == (np.abs(closing).max() > CONFIG.max_velocity)
 
 
-def test_noise_and_a_single_transmitter_tell_nothing():
+def test_noise_and_a_single_transmitter_resolve_nothing():
     noise = np.random.default_rng(2).normal(0, 20, (3, *CONFIG.frame_shape)).astype(np.int16)
     assert not Aliases(CONFIG).of(Heatmaps(CONFIG).spectrum(noise)).any()
     single = CONFIG.model_copy(update={"tx_order": (0,)})

@@ -1,4 +1,4 @@
-"""What goes through the pipeline: which frames, and that each thing is made once."""
+"""Batches: selection of frames, and caching of products."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def adc():
 
 
 def test_what_is_made_is_made_once(signal, adc, monkeypatch):
-    """However many ask, and anew for the next batch; methods of two objects are two."""
+    """Each product is computed once per batch; methods of two objects have separate products."""
     asked = []
     for where, name in ((Heatmaps, "spectrum"), (PointClouds, "of")):
         whole = getattr(where, name)
@@ -37,7 +37,7 @@ def test_what_is_made_is_made_once(signal, adc, monkeypatch):
     assert torch.equal(third.spectrum, signal.heatmaps.spectrum(adc[:3]))
 
 
-def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
+def test_losses_are_passed_to_the_spectrum(signal, adc):
     valid = np.ones((3, 16, 3), bool)
     valid[1, 2:] = False
     found = batch(signal, adc[:3], np.arange(3), valid).spectrum
@@ -47,7 +47,7 @@ def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
 
 @pytest.mark.parametrize("size", [1, 5, FRAMES])
 def test_lost_frames_are_left_out(signal, adc, size):
-    """Silent, lost, or nearly lost frames; numbers go on counting them."""
+    """Frames without signal, lost, or nearly lost; numbers count them."""
     adc, valid = adc.copy(), np.ones((FRAMES, 16, 3), bool)
     stamps = 10.0 + np.cumsum(np.linspace(0.02, 0.045, FRAMES))
     adc[0] = 0
@@ -68,8 +68,8 @@ def test_lost_frames_are_left_out(signal, adc, size):
 
 @pytest.mark.parametrize("size", [1, 2, 5, FRAMES])
 def test_every_third_frame(signal, adc, size):
-    """The same ones whatever the batches, by the radar's own numbers where some never came; lost ones are counted among
-    them alone."""
+    """The same frames for any batch size, by the radar's own numbers if frames are missing; only lost ones among them
+    are counted."""
     valid, numbers = np.ones((FRAMES, 16, 3), bool), np.delete(np.arange(FRAMES + 2), [3, 7])
     valid[[4, 5]] = False  # numbers 5, 6
     for sent, taken, lost, used in ((np.arange(FRAMES), 4, 0, [0, 3, 6, 9]), (numbers, 4, 1, [0, 9, 12])):
@@ -96,7 +96,7 @@ def test_batches_keep_their_samples(signal, adc):
 
 
 def test_maps_alone(signal):
-    """A batch of maps gives them as they are, and says so where somebody asks for more."""
+    """A batch of maps returns them unchanged, and raises an error for other products."""
     shown = np.arange(24.0).reshape(2, 3, 4)
     preprocessor = Preprocessor(signal)
     first, second = (

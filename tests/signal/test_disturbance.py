@@ -19,11 +19,11 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 @pytest.fixture(scope="module")
 def tour():
-    """Of a furnished room with a mirror, and with leakage at no range: samples, and true velocities (frame, 2)."""
+    """Furnished room with a mirror, and leakage at zero range: samples, and true velocities (frame, 2)."""
     rng = np.random.default_rng(0)
     points, amplitudes = furnished_room(rng, density=8.0, boxes=6)
     pose = walk(rng, 2.0)
-    points, amplitudes = np.vstack([points, [6.9, 2.5, 0.0]]), np.append(amplitudes, 3000.0)  # flashes
+    points, amplitudes = np.vstack([points, [6.9, 2.5, 0.0]]), np.append(amplitudes, 3000.0)  # a strong echo
     adc = record(CONFIG, pose, points, amplitudes, STAMPS, rng, 20.0, block=32, gain=antenna_gain)
     leakage = 3000 * np.exp(2j * np.pi * 0.3 * np.arange(CONFIG.samples) / CONFIG.samples)
     adc += np.stack([leakage.real, leakage.imag], axis=-1).astype(np.int16)
@@ -35,7 +35,7 @@ def tour():
 
 
 def disturb(adc, share, burst, seed=1):
-    """Add what another radar sends to a share of the chirps; returns these, too."""
+    """Add interference to a fraction of the chirps; returns these, too."""
     rng, adc = np.random.default_rng(seed), adc.copy()
     hit = rng.random(adc.shape[:3]) < share
     hit[0, 3, 1] = True
@@ -77,7 +77,7 @@ def test_disturbed_chirps_are_left_out_and_cost_little(tour, share, burst):
 
 
 def test_chirps_left_as_they_are_cost_much(tour, monkeypatch):
-    """Or the test above shows nothing."""
+    """Without the correction the error is large, so the test above is meaningful."""
     adc, truth = tour
     monkeypatch.setattr("radarize.signal.disturbance._OFF", np.inf)
     assert rms(speeds(disturb(adc, 0.05, "sweep")[0])[0] - truth) > 3 * rms(speeds(adc)[0] - truth)
@@ -90,7 +90,7 @@ def test_lost_chirps_have_no_say(tour):
     valid[3], valid[4, :, 1], valid[5, 5:] = False, False, False
     hurt[~valid] = 30000
     expected = hit & valid
-    expected[5] = False  # too few are left to tell
+    expected[5] = False  # too few are left for an estimate
     assert np.array_equal(find_flaws(hurt, valid).disturbed, expected)
 
 

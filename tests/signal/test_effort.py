@@ -1,4 +1,4 @@
-"""Radars whose frames are much larger than the preset's: what they cost is bounded, and said before."""
+"""Radars whose frames are much larger than the preset's: memory is bounded, and a remark states the cost."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ ALLOWED = [
 
 @pytest.mark.parametrize("config", ALLOWED, ids=lambda c: f"{c.samples}-{c.loops}-{c.frame_period}")
 def test_rotation_looks_at_so_many_cells_and_no_more(config):
-    """Cells are what all its steps take time for."""
+    """The number of cells determines the time of all its steps."""
     check_limits(config)
     rotation, rng = MapRotation(Heatmaps(config)), np.random.default_rng(0)
     shape = (1, config.samples, config.loops, len(config.slot) * len(config.rx))
@@ -42,7 +42,7 @@ def test_rotation_looks_at_so_many_cells_and_no_more(config):
 
 
 def test_the_strongest_of_neighbouring_speeds_are_what_is_left():
-    """By brute force; and a frame of as few speeds as the preset's is left as it is."""
+    """Against brute force; a frame with as few speeds as the preset's is unchanged."""
     rng = np.random.default_rng(0)
     cells = (rng.normal(size=(2, 3, 200, 6)) + 1j * rng.normal(size=(2, 3, 200, 6))).astype(np.complex64)
     left = _reduce_doppler(torch.as_tensor(cells)).numpy()
@@ -54,11 +54,11 @@ def test_the_strongest_of_neighbouring_speeds_are_what_is_left():
     assert _reduce_doppler(few) is few
 
 
-def test_it_is_said_before(tmp_path):
+def test_there_is_a_remark_before(tmp_path):
     assert effort(PRESET, 10) == "" and together(PRESET) == 16
     assert together(LARGEST) * LARGEST.frame_bytes <= 32 << 20
     times = 1024 * 255 / 96 / 32
-    assert f"holds {times:.1f} times the samples" in effort(LARGEST, 3) and "each of the 3 " in effort(LARGEST, 3)
+    assert f"has {times:.1f} times the samples" in effort(LARGEST, 3) and "each of the 3 " in effort(LARGEST, 3)
     path, large = tmp_path / "large.h5", PRESET.model_copy(update={"loops": 128, "frame_period": 0.2})
     with RecordingWriter(path, large) as writer:
         noise = np.random.default_rng(0).integers(-200, 200, (2, *large.frame_shape))

@@ -14,13 +14,13 @@ CONFIG = PRESETS["radarize"]
 
 
 def point(range_=2.0, azimuth=0.0, elevation=0.0):
-    """A point around the origin, angles in degrees."""
+    """Point around the origin, angles in degrees."""
     a, e = np.radians([azimuth, elevation])
     return range_ * np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
 def frame(points, velocity=(0.0, 0.0, 0.0), amplitudes=None, config=CONFIG, noise=0.0):
-    """One frame, its burst centre at the origin, looking along x and moving evenly."""
+    """One frame with its burst centre at the origin, looking along x, in uniform motion."""
     points = np.atleast_2d(points)
     amplitudes = np.full(len(points), 1000.0) if amplitudes is None else np.asarray(amplitudes)
 
@@ -75,7 +75,7 @@ def test_range_doppler_peak(speed):
 
 
 def test_what_aliases_has_its_azimuth_once_unfolded():
-    """A slot's turn of 120 deg looks like another azimuth."""
+    """A phase step of 120 deg per slot looks like another azimuth."""
     maps = Heatmaps(CONFIG)
     spectrum = maps.spectrum(frame(point(2.0, 10), velocity=(2.4, 0, 0)))
 
@@ -118,7 +118,7 @@ def test_beam_width():
 
 def test_capon_resolves_what_the_beam_does_not():
     maps = Heatmaps(CONFIG)
-    # Moving tells the two apart in Doppler, so that they are not coherent.
+    # Motion separates the two in Doppler, so that they are not coherent.
     adc = frame([point(2.0, -5), point(2.0, 6)], velocity=(0, 1.2, 0), noise=3.0)
 
     def dip(power):
@@ -217,7 +217,7 @@ def test_batches_equal_single_frames_and_wrong_shapes_are_named():
     maps = Heatmaps(CONFIG)
     adc = np.concatenate([frame(point(2.0, a)) for a in (-20, 0, 20)])
     together = maps.range_azimuth(adc)
-    # How sums are ordered differs with the size of a batch on some processors: alike to single precision of the peak.
+    # How sums are ordered differs with the size of a batch on some processors: equal to single precision of the peak.
     peak = float(together.max())
     torch.testing.assert_close(together[1:2], maps.range_azimuth(adc[1:2]), rtol=1e-5, atol=1e-6 * peak)
     with pytest.raises(InputError, match="expected"):

@@ -53,7 +53,7 @@ def test_a_target_is_found_where_it_is(azimuth, elevation):
 
 
 def test_a_frame_has_the_same_points_in_any_batch():
-    """To the bit: a matrix product over the detections of all frames is rounded by how many there are."""
+    """Bit-identical: the rounding of a joint matrix product would depend on the number of detections."""
     places = np.array([polar(*each) for each in ((1.7, 33, 4), (2.3, -25, 12), (3.1, 8, -9), (3.6, -47, 2))])
     adc = record(
         CONFIG, lambda t: (t[..., None] * [0.3, 0.1, 0], 0.2 * t), places, np.full(4, 400 + 0j),
@@ -69,7 +69,7 @@ def test_a_frame_has_the_same_points_in_any_batch():
 
 @pytest.mark.parametrize("speed", [-1.5, -0.4, 0.4, 1.5])
 def test_closing_is_positive_and_does_not_turn_the_target(speed):
-    """Without taking the delays of the transmitters out, 1.5 m/s would move it by 11 degrees."""
+    """Without compensation of the TDM delays, 1.5 m/s would shift it by 11 degrees."""
     points, _ = cloud(polar(2.0, 15), velocity=(speed, 0, 0))
     best = points[points[:, 4].argmax()]
     expected = speed * np.cos(np.radians(15))
@@ -117,7 +117,7 @@ def test_lost_chirps_weigh_nothing():
     assert np.degrees(np.arctan2(best[1], best[0])) == pytest.approx(10, abs=2.5)
 
 
-def test_two_transmitters_tell_no_height():
+def test_two_transmitters_resolve_no_height():
     points, _ = cloud(polar(2.0, 10, 10), config=PRESETS["two-tx"])
     assert points[:, 2].tolist() == [0.0] * len(points) and len(points) >= 1
 
@@ -134,8 +134,8 @@ def test_too_few_cells_are_refused():
 
 
 def test_moving_people_of_a_real_capture():
-    """Labelled by its makers: static target at 5.22 m; two people at 2.93 m, one closing at 0.5...0.8 m/s and 12...16
-    deg to the left, one receding at 0.58 m/s and 7 deg to the right (their signs turned into ours)."""
+    """Labels of its makers: static target at 5.22 m; two people at 2.93 m, one closing at 0.5...0.8 m/s and 12...16 deg
+    to the left, one receding at 0.58 m/s and 7 deg to the right (signs converted to ours)."""
     path = RECORDINGS / "xwr-moving-people" / "doppler_example_1.npy"
     if not path.exists():
         pytest.skip("needs ../shared/recordings")

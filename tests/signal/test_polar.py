@@ -1,4 +1,4 @@
-"""Polar pictures against a plain transcription of what is published of them, and the measures of points."""
+"""Polar images against a plain transcription of the published program, and the measures of points."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def samples(echoes: list[tuple[float, float, float]], noise: float = 3.0, frames
 
 
 def transcribed(frame: np.ndarray) -> np.ndarray:
-    """The picture of a frame, cell by cell."""
+    """Image of a frame, cell by cell."""
     loop = frame[0, [0, 2]].astype(float) @ [1, 1j]
     spectrum = np.fft.fftshift(np.fft.fft(np.fft.fft(loop.reshape(8, 512), axis=1), 64, axis=0), axes=0)
     magnitude = np.abs(spectrum)

@@ -1,4 +1,4 @@
-"""Broken receivers: what fills their place is what they would have said of single echoes."""
+"""Broken receivers: their interpolated values equal the true ones for single echoes."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 def pure(config, azimuth):
-    """The spectrum of one echo in every cell: exact phases of virtual antennas, flat (tx, rx)."""
+    """Spectrum of one echo in every cell: exact phases of virtual antennas, flat (tx, rx)."""
     maps = Heatmaps(config)
     count = len(config.tx) * len(config.rx)
     phases = maps.steering(np.arange(count), np.sin([np.radians(azimuth)]))[:, 0]
@@ -33,7 +33,7 @@ def test_a_single_echo_is_as_if_nothing_were_broken(places, azimuth):
     broken[1, list(places)] = True
     hurt.unflatten(-1, (3, 4))[1][..., list(places)] = 777.0
     found = Receivers(CONFIG).filled(hurt, broken)
-    missing = (0, 3) if places == (1, 2) else ()  # no two neighbours are left to tell the step
+    missing = (0, 3) if places == (1, 2) else ()  # no two neighbours are left to estimate the step
     expected = whole.clone()
     if missing:
         expected.unflatten(-1, (3, 4))[1][..., list(places)] = 0
@@ -51,7 +51,7 @@ def test_square_arrays_are_filled_along_their_rows(board):
 
 @pytest.fixture(scope="module")
 def tour():
-    """Of a furnished room: samples, stamps and true velocities."""
+    """Furnished room: samples, time stamps and true velocities."""
     rng = np.random.default_rng(0)
     pose, stamps = walk(rng, 2.0), np.arange(12) * CONFIG.frame_period
     adc = record(
@@ -86,7 +86,7 @@ def test_velocity_hardly_suffers(tour, kind):
 
 
 def test_a_broken_receiver_left_as_it_is_costs_much(tour, monkeypatch):
-    """Or the test above shows nothing."""
+    """Without interpolation the error is large, so the test above is meaningful."""
     adc, stamps, truth = tour
     hurt = adc.copy()
     hurt[:, :, :, 2] = np.clip(800 * hurt[:, :, :, 2].astype(int), -32768, 32767)

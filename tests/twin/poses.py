@@ -14,7 +14,7 @@ Change = Callable[[np.ndarray, h5py.File], np.ndarray]
 
 
 def altered(recording: Path, path: Path, change: Change) -> Path:
-    """A copy of a recording whose poses, and more, were changed."""
+    """Copy of a recording with changed poses and other changes."""
     shutil.copy(recording, path)
     with h5py.File(path, "r+") as file:
         file["truth/pose"][:] = change(file["truth/pose"][:], file)
@@ -22,7 +22,7 @@ def altered(recording: Path, path: Path, change: Change) -> Path:
 
 
 def shaken(metres: float, degrees: float) -> Change:
-    """Slow errors of poses, standard deviations."""
+    """Add slow random errors to poses; standard deviations."""
 
     def change(poses: np.ndarray, file: h5py.File) -> np.ndarray:
         noise = gaussian_filter1d(np.random.default_rng(1).standard_normal((len(poses), 6)), 2, axis=0)

@@ -1,4 +1,4 @@
-"""Fréchet's distance against closed forms; patch statistics of maps made by hand."""
+"""Fréchet distance against closed forms; patch statistics of maps with known content."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,8 @@ def test_foreground_forgets_gain_and_noise():
 
 
 def test_similarity_is_wangs_ms_ssim():
-    """Of maps with room for two scales: cs(fine)^w1 * ssim(coarse)^w2, windows by brute force; coarse maps mirrored."""
+    """For maps with space for two scales: cs(fine)^w1 * ssim(coarse)^w2, windows by brute force; coarse maps
+    mirrored."""
     rng = np.random.default_rng(4)
     one = np.clip(rng.normal(20, 8, (1, 16, 16)), 0, DEPTH)
     other = np.clip(one + rng.normal(0, 3, one.shape), 0, DEPTH)

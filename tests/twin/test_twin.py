@@ -1,7 +1,5 @@
-"""Twins: a recording that plays the real one, simulated again with one error at a time.
-
-The figures must be perfect for the recording itself, and fall with wrong materials, wrong poses and the wrong place.
-"""
+"""Twins: a simulated recording in place of the real one, simulated again with one error at a time. The figures must be
+perfect for the recording itself, and decrease with wrong materials, wrong poses and the wrong place."""
 
 import json
 from dataclasses import replace
@@ -26,7 +24,7 @@ from tests.twin.poses import altered, shaken
 
 
 def room(name: str, x: float, y: float, things: list[dict]) -> Scene:
-    """A room of x x y x 2.6 m with things in it."""
+    """Room of x x y x 2.6 m with objects."""
     walls = [
         ("west", [y, 2.6], [-x / 2, 0, 1.3], [1, 0, 0]), ("east", [y, 2.6], [x / 2, 0, 1.3], [-1, 0, 0]),
         ("south", [x, 2.6], [0, -y / 2, 1.3], [0, 1, 0]), ("north", [x, 2.6], [0, y / 2, 1.3], [0, -1, 0]),
@@ -62,7 +60,7 @@ ELSEWHERE = room("elsewhere", 6.4, 5.2, [
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory):
-    """Five frames a second for two seconds on a curve through the place."""
+    """Recording at five frames per second for two seconds on a curve through the place."""
     folder = tmp_path_factory.mktemp("real")
     _, text = load_config("radarize")
     fields = next(line for line in text.splitlines() if line.startswith("frameCfg")).split()
@@ -84,7 +82,7 @@ def medians(found) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def compared(real, tmp_path_factory):
-    """Comparisons by what is wrong with the twin."""
+    """Comparisons by the error of the twin."""
     folder = tmp_path_factory.mktemp("twins")
     metal = Scene("place", [replace(thing, material=MATERIALS["metal"]) for thing in PLACE.objects])
 
@@ -113,7 +111,7 @@ def test_a_recording_is_like_itself(compared):
 
 
 def test_every_error_shows(compared):
-    """From the best twin to the worst; speckle is the least of errors, and the wrong place the worst."""
+    """From the best twin to the worst: different speckle is the smallest error, the wrong place the largest."""
     order = ["itself", "same seed", "other seed", "3 cm", "10 cm", "elsewhere"]
     for name in ("correlation_range_azimuth", "similarity_range_azimuth", "profile_correlation"):
         values = [medians(compared[which])[name] for which in order]
@@ -127,7 +125,7 @@ def test_every_error_shows(compared):
 
 
 def test_velocities_follow_the_poses(compared):
-    """Speckle, materials and even the place leave the velocity; poses that are off do not."""
+    """Speckle, materials and even the place do not affect the velocity; wrong poses do."""
     off = {which: medians(found)["velocity"] for which, found in compared.items()}
     assert max(off["other seed"], off["elsewhere"]) < 0.05 < off["10 cm"]
     errors = medians(compared["10 cm"])
@@ -142,7 +140,7 @@ def test_unrelated_frames_are_the_scale(compared):
 
 
 def test_the_twin_takes_stamps_and_losses(real, tmp_path):
-    """Stamps of a real clock, lost chirps, and half of the frames."""
+    """Time stamps of a real clock, lost chirps, and half of the frames."""
     clock = 1.7e9
 
     def change(poses, file):
@@ -165,7 +163,7 @@ def test_the_twin_takes_stamps_and_losses(real, tmp_path):
     assert medians(compare(tmp_path / "real.h5", made))["correlation_range_azimuth"] > 0.8
 
 
-def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
+def test_a_wrong_clock_and_a_wrong_heading_are_reported(real, tmp_path):
     def late(poses, file):
         file["truth/time"][:] += 0.4
         return poses
@@ -191,7 +189,7 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
 
 
 def test_poses_of_another_body_in_another_frame(real, tmp_path, compared):
-    """Poses of a cart, in coordinates of its own, make the same twin once both are told."""
+    """Poses of a cart, in its own coordinates, give the same twin if origin and mounting are given."""
     origin, mounting = Mounting.of((3, -2, 0.4), (0, 0, 50)), Mounting.of((0.2, 0.1, 0.5), (0, 10, -30))
 
     def change(poses, file):
@@ -209,7 +207,7 @@ def test_poses_of_another_body_in_another_frame(real, tmp_path, compared):
 
 
 def test_a_board_with_calibration_and_bias(real, tmp_path):
-    """What a configuration corrects, the twin's board has: neither comes out wrong."""
+    """The twin's board has the errors that a configuration corrects: range and channels are right."""
     rng = np.random.default_rng(0)
     factors = np.exp(2j * np.pi * rng.random(12))
     with Recording(real) as one:
@@ -232,7 +230,7 @@ def test_a_board_with_calibration_and_bias(real, tmp_path):
     assert medians(found)["correlation_range_azimuth"] > 0.75 and not found.misfits()
 
 
-def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
+def test_what_is_missing_is_reported_in_a_sentence(real, tmp_path):
     def refused(recording=real, scene=PLACE, **options):
         with pytest.raises(InputError) as caught:
             make_twin(recording, scene, tmp_path / "x.h5", Options(**options))
@@ -272,7 +270,8 @@ def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
 
 
 def test_real_captures(recordings, tmp_path):
-    """Frames of undescribed rooms: without a pose there is a sentence; with one, the fitted board has their noise."""
+    """Frames from unknown rooms: without a pose there is an error message; with one, the fitted board has their
+    noise."""
     for name, path in captures(recordings, tmp_path).items():
         with pytest.raises(InputError, match="has no poses"):
             make_twin(path, PLACE, tmp_path / "x.h5")

@@ -1,4 +1,4 @@
-"""Beams of a level scanner, for tests that look round."""
+"""Beams of a level scanner, for tests of the surroundings."""
 
 import numpy as np
 from jaxtyping import Float

@@ -1,4 +1,4 @@
-"""Floors of all four styles: walkable, closed, reproducible, and of the style's materials."""
+"""Floors of all four styles: accessible, closed, reproducible, with the style's materials."""
 
 import re
 
@@ -179,7 +179,7 @@ def test_styles_differ_in_material(floors):
 
 
 def test_facade_is_of_one_material():
-    """All that faces outward on the outline, below windows and above as well."""
+    """All outward faces on the outline, below windows and above as well."""
     building = Building(kind="D", seed=4, furnished=False)
     edge = building.skeleton().outline.exterior
     for item in building.build():

@@ -1,4 +1,4 @@
-"""Where the ground is, and what is nearest."""
+"""Ground level, and the nearest object."""
 
 import numpy as np
 import pytest

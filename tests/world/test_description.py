@@ -1,4 +1,4 @@
-"""Scene files: what they mean, and one clear sentence for each mistake."""
+"""Scene files: their meaning, and error messages of one sentence."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ PLAIN += f", {PLAIN.replace('top', 'floor').replace('[0, 0, 1], f', '[0, 0, 0], 
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("text", "message"),
     [
         ("objects: [", "malformed YAML"),
         ("[1, 2]", "holds list, expected keys"),
@@ -69,8 +69,8 @@ PLAIN += f", {PLAIN.replace('top', 'floor').replace('[0, 0, 1], f', '[0, 0, 0], 
         ("objects: 3", "objects is 3"),
     ],
 )
-def test_mistakes_get_one_sentence(tmp_path, text, complaint):
-    with pytest.raises(InputError, match=complaint) as caught:
+def test_mistakes_get_one_sentence(tmp_path, text, message):
+    with pytest.raises(InputError, match=message) as caught:
         load(tmp_path, text)
     message = str(caught.value)
     assert "scene" in message and "\n" not in message
@@ -114,15 +114,15 @@ def test_movers(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("mover", "complaint"),
+    ("mover", "message"),
     [
         ("{kind: ghost, name: g}", r"moving\[0\]"),
         ("{kind: person, name: p}", r"moving\[0\].path \(object 'p'\)"),
         ("{kind: fan, name: f, center: [0, 0, 2], turns_per_second: 50}", r"turns_per_second \(object 'f'\) is 50"),
     ],
 )
-def test_bad_movers(tmp_path, mover, complaint):
-    with pytest.raises(InputError, match=complaint):
+def test_bad_movers(tmp_path, mover, message):
+    with pytest.raises(InputError, match=message):
         load(tmp_path, f"objects: [{WALL}]\nmoving: [{mover}]")
 
 
@@ -153,7 +153,7 @@ def test_each_level_is_laid_upon_the_one_before(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("level", "text", "complaint"),
+    ("level", "text", "message"),
     [
         (3, LEVELS, "level is 3, expected 0 to 2"),
         (1, f"objects: [{WALL}]", "level is 1, expected 0 to 0"),
@@ -163,8 +163,8 @@ def test_each_level_is_laid_upon_the_one_before(tmp_path):
         (1, LEVELS.replace("name: wall two, size", "name: wal two, size"), r"objects\[2\] \(object 'wal two'\)"),
     ],
 )
-def test_mistakes_in_levels(tmp_path, level, text, complaint):
-    with pytest.raises(InputError, match=complaint) as caught:
+def test_mistakes_in_levels(tmp_path, level, text, message):
+    with pytest.raises(InputError, match=message) as caught:
         load(tmp_path, text)
         Scene.load(f"{tmp_path / 'scene.yaml'}@{level}")
     assert "scene.yaml" in str(caught.value) and "\n" not in str(caught.value)
@@ -187,7 +187,7 @@ def test_mistakes_in_levels(tmp_path, level, text, complaint):
     ],
 )
 def test_clutter_and_unevenness(tmp_path, text, settings):
-    """1 by default of what has a building, 0 of objects alone; what is given counts, 0 too, at every level."""
+    """Default 1 with a building, 0 with objects only; given values apply at every level, 0 too."""
     assert load(tmp_path, text).surface_settings == settings
     if "levels" in text:
         assert Scene.load(f"{tmp_path / 'scene.yaml'}@1").surface_settings == settings

@@ -1,4 +1,4 @@
-"""Scenes as meshes: where things are, how large, and of which material, by trimesh and by our own import."""
+"""Export of scenes as meshes: positions, sizes and materials, read by trimesh and by the project's import."""
 
 import numpy as np
 import pytest

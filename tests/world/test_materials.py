@@ -95,7 +95,7 @@ def test_names():
 
 
 def test_a_scaled_material():
-    """eps' and conductivity by their factors at every frequency; what is scattered follows what is reflected."""
+    """eps' and conductivity are multiplied at every frequency; diffuse power follows the reflected power."""
     for name in ("concrete", "fabric", "plasterboard"):
         plain, other = material(name), material(name).scaled(permittivity=1.2, conductivity=0.5)
         for frequency in (60e9, 77e9, 81e9):

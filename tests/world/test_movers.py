@@ -1,4 +1,4 @@
-"""Movers: kinematics, their surfaces, and what they hide."""
+"""Moving objects: kinematics, surfaces, and occlusion."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_body_stays_together_and_on_the_floor():
     assert (center[:, 1, 2] == center[..., 2].max(axis=1)).all()
 
 
-def test_legs_alternate():
+def test_feet_alternate():
     """When the right foot swings forward the left one goes back, as seen from the trunk."""
     t = np.linspace(0, 5, 400)
     _, center = WALKER.poses(t)
@@ -44,7 +44,7 @@ def test_legs_alternate():
 
 
 def test_motion_is_smooth():
-    """No part ever jumps: speeds stay below 6 m/s, accelerations finite, corners and about-turns included."""
+    """Speeds stay below 6 m/s and accelerations finite, corners and turn-arounds included."""
     round_trip = Person(name="p", path=((0, 0), (2, 0), (2, 2)), speed=1.0)
     t = np.arange(0, 12, 1e-3)
     _, center = round_trip.poses(t)

@@ -1,4 +1,4 @@
-"""The office: reproducible, walkable, and clean geometry."""
+"""The office: reproducible, accessible, and with clean geometry."""
 
 import zlib
 
@@ -21,7 +21,7 @@ def test_same_seed_same_bytes():
     assert any(a.mesh.vertices.tobytes() != b.mesh.vertices.tobytes() for a, b in zip(first, other, strict=False))
 
 
-#: Number of objects and of their corners, and sums of places that tell which object is where, and of what.
+#: Number of objects and of their corners, and weighted sums of positions that identify objects and materials.
 KNOWN = {
     Office(seed=7): (303, 8548, 204063.0104, 141929.0465, 29369.4556),
     Office(seed=11, length=40, depth=9.6, corridor=2.4, room=4.0): (538, 16504, 1540320.7812, 385908.7593, 87630.1675),
@@ -33,8 +33,8 @@ KNOWN = {
 @pytest.mark.parametrize("building", KNOWN, ids=lambda b: f"{b.kind} {b.seed}")
 def test_floors_are_those_that_results_were_made_with(building):
     objects = building.build()
-    told = [zlib.crc32(f"{o.name} {o.material.name} {o.solid}".encode()) / 2**32 for o in objects]
-    sums = np.arange(1, len(objects) + 1) * told @ np.array([o.mesh.vertices.mean(axis=0) for o in objects])
+    checksums = [zlib.crc32(f"{o.name} {o.material.name} {o.solid}".encode()) / 2**32 for o in objects]
+    sums = np.arange(1, len(objects) + 1) * checksums @ np.array([o.mesh.vertices.mean(axis=0) for o in objects])
     found = (len(objects), sum(len(o.mesh.vertices) for o in objects), *sums)
     assert found == pytest.approx(KNOWN[building], abs=1e-3, rel=0)
 
@@ -82,7 +82,7 @@ def test_is_an_office(office):
 
 @pytest.mark.parametrize("building", [Office(seed=0), Office(seed=7), Building(kind="A"), Building(kind="C")])
 def test_no_face_lies_on_another(building):
-    """From just outside any face one looks into the open, not into a coplanar copy: its own surface is the nearest."""
+    """The nearest surface just outside any face is that face itself, not a coplanar copy."""
     scene = Scene("x", building.build())
     rng = np.random.default_rng(0)
     weight = rng.dirichlet(np.ones(3), len(scene.triangles))
@@ -115,10 +115,10 @@ def test_clearance_is_a_distance(office):
     every = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
     rng = np.random.default_rng(0)
     points = rng.uniform([1, 5.1], [17, 6.9], (40, 2))
-    claimed = clearance.at(points)
+    found = clearance.at(points)
     heights = np.linspace(0.1, 1.4, 24)
     column = np.concatenate([np.column_stack([points, np.full(len(points), h)]) for h in heights])
     _, true, _ = trimesh.proximity.closest_point(every, column)
     true = true.reshape(len(heights), -1).min(axis=0)
-    assert np.all(claimed <= true + 0.01)
-    assert np.median(true - claimed) < 0.12
+    assert np.all(found <= true + 0.01)
+    assert np.median(true - found) < 0.12

@@ -1,4 +1,4 @@
-"""Files that name others in other folders are refused until the user permits it."""
+"""Scene files that name files in other folders are refused unless the user permits it."""
 
 import pytest
 from PIL import Image
@@ -17,7 +17,7 @@ SCENE = "objects: [{{name: a, shape: mesh, file: {}, material: concrete}}]\n"
 
 @pytest.fixture
 def mine(tmp_path):
-    """A folder of its own, beside files that are not its business."""
+    """Folder of a scene, beside files that it must not read."""
     (tmp_path / "mine").mkdir()
     (tmp_path / "a.obj").write_text(OBJ)
     (tmp_path / "a.mtl").write_text("newmtl x\n")

@@ -1,4 +1,4 @@
-"""The pictures show what is there."""
+"""Contents of the preview pictures."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_view_looks_into_the_rooms(office):
     assert distance[0] == pytest.approx(1.2, abs=1e-4)
 
 
-def test_section_knows_inside_from_outside():
+def test_section_distinguishes_inside_from_outside():
     """A square tube: its wall is filled, its bore and a sheet beside it are not."""
     outer = shapes.box((0, 0, 1), (2, 2, 2), ("-z", "+z"))
     inner = shapes.box((0, 0, 1), (1, 1, 2), ("-z", "+z"))

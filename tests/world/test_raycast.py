@@ -1,4 +1,4 @@
-"""Rays against things that move, against Open3D's casts of the same shapes as meshes."""
+"""Rays against moving objects, compared with Open3D's casts on the same shapes as meshes."""
 
 import numpy as np
 import open3d as o3d
@@ -46,7 +46,7 @@ def test_movers_are_met_where_they_are(mover):
 
 
 def test_cameras_look_through_a_glass_door_that_moves():
-    """As through a pane that stands; a lidar meets it, and a camera a wooden one."""
+    """Transparent to cameras like a static pane; a lidar detects it, and a camera detects a wooden one."""
     way, met = np.array([[[1.0, 0.0, 0.0]]]), []
     for material, through_glass in (("glass", True), ("glass", False), ("wood", True)):
         leaf = Door(name="d", hinge=(2.0, -0.4, 1.0), angles=(90, 90), thickness=0.02, material=material)

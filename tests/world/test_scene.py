@@ -1,4 +1,4 @@
-"""Ray tests against other programs' and against geometry done by hand."""
+"""Ray tests against other programs' and against geometry calculated manually."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def clutter() -> Scene:
 
 
 def brute_force(scene: Scene, origins, directions):
-    """Nearest hit by Moeller and Trumbore's test of every triangle in float64."""
+    """Nearest hit by Moeller and Trumbore's test of every triangle, in float64."""
     a, b, c = (scene.triangles[:, k] for k in range(3))
     edge1, edge2 = b - a, c - a
     best, index = np.full(len(origins), np.inf), np.full(len(origins), -1)
@@ -132,7 +132,7 @@ def lying(*objects: SceneObject) -> np.ndarray:
 
 
 def test_floor_and_ceiling_of_a_room_in_one_mesh():
-    """A scan knows faces alone: those at the bottom that face up, and those at the top that face down."""
+    """In a scan, faces at the bottom that face up are floor, and those at the top that face down are ceiling."""
     room, table = shapes.box((0, 0, 1.3), (5, 4, 2.6)), shapes.box((0, 0, 0.7), (1, 1, 0.04))
     room.invert()
     cabinet = shapes.box((2, 0, 1.05), (0.5, 0.5, 2.1))
@@ -178,7 +178,7 @@ def test_refuses_what_rays_cannot_use():
 
 
 def test_rays_are_read_in_packets_past_their_end(clutter):
-    """What Dr.Jit is lent has room behind it; and it is read where it lies, which is why."""
+    """Arrays passed to Dr.Jit have padding, because it reads them in place and in packets."""
     assert clutter.occluded(np.zeros(3), np.ones((1, 3))).shape == (1,)  # Dr.Jit is there
     values = np.arange(10.0).reshape(2, 5)
     found = _lent(values.T, np.float32)

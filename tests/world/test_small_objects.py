@@ -1,4 +1,4 @@
-"""Small objects: on their surfaces and in nothing, as many as asked for, the same ones every time."""
+"""Small objects: on surfaces, without intersections, with the specified density, reproducible."""
 
 from itertools import product
 
@@ -57,7 +57,7 @@ def bytes_of(objects: list[SceneObject]) -> bytes:
 
 @pytest.mark.parametrize("name", PLANS)
 def test_backs_lie_on_surfaces(drawn, found, name):
-    """All of them, by the nearest triangle, and that faces as they do."""
+    """All backs lie on the nearest triangle and have its orientation."""
     mesh = np.concatenate([o.mesh.triangles for o in drawn[name]])
     normals = np.concatenate([o.mesh.face_normals for o in drawn[name]])
     world = open3d.t.geometry.RaycastingScene()
@@ -77,7 +77,7 @@ def test_backs_lie_on_surfaces(drawn, found, name):
 
 @pytest.mark.parametrize("name", PLANS)
 def test_they_stand_in_nothing_and_not_in_one_another(drawn, found, name):
-    """No triangle of the drawing reaches into a box, and no ray from inside it comes to a body's inner side."""
+    """No triangle of the drawing intersects a box, and no ray from inside it hits the inner side of a body."""
     spots = everything(found[name])
     triangles = np.concatenate([o.mesh.triangles for o in drawn[name]])
     low, high = triangles.min(axis=1), triangles.max(axis=1)
@@ -87,7 +87,7 @@ def test_they_stand_in_nothing_and_not_in_one_another(drawn, found, name):
         half = spots.size[k] / 2
         inside = (near - spots.place[k]) @ spots.axes[k].T / half - [0, 0, 1]
         flat, faces = inside.reshape(-1, 3), np.arange(inside.size // 3).reshape(-1, 3)
-        edge = 1 - 2.5e-3 / half  # a surface may be off by 2 mm
+        edge = 1 - 2.5e-3 / half  # tolerance of a surface: 2 mm
         for axis, sign in product(range(3), (-1, 1)):
             if len(faces):
                 normal = -sign * np.eye(3)[axis]
@@ -117,7 +117,7 @@ def test_none_in_openings(found, kind):
 
 @pytest.mark.parametrize("name", PLANS)
 def test_sizes_and_ways(found, name):
-    """At least 2 cm across, but for cables, and nothing that one could run into sticks out of a wall."""
+    """At least 2 cm across, except cables, and nothing that people could run into protrudes from a wall."""
     for kind, spots in found[name].items():
         size = np.sort(spots.size, axis=1)
         assert (size[:, 2] >= 0.02).all()
@@ -128,7 +128,7 @@ def test_sizes_and_ways(found, name):
 
 
 def test_as_many_as_asked_for():
-    """In a bare hall counts are Poisson's about density times area or length, and follow the level."""
+    """In a bare hall numbers are Poisson-distributed about density times area or length, and follow the level."""
     objects = hall()
     area, walls = 24.0**2, 4 * 24.0
     for level in (0.5, 1.0, 4.0):
@@ -171,7 +171,7 @@ def test_every_style_has_all_sorts(found, name):
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
 def test_imported_plans(tmp_path, yaw):
-    """Walls of a map, at any angle: things on them, lamps where it has none, and ways through the doors."""
+    """Walls of a map, at any angle: objects on them, lamps if it has none, and free doors."""
     path = import_scene(draw_map(tmp_path, yaw), tmp_path / "out", Options(height=2.5)).path
     plain = Scene.load(path)
     path.write_text(path.read_text() + "clutter: 1\n")
@@ -184,7 +184,8 @@ def test_imported_plans(tmp_path, yaw):
 
 
 def test_what_is_merged_reflects_as_each_would(found):
-    """Flat parts and round bodies of merged things are those of the things; nothing is a sheet, a slab or a floor."""
+    """Flat parts and round bodies of merged objects are those of the single objects; none is a sheet, a slab or a
+    floor."""
     alone, sorts = [], set()
     for kind, spots in found["office"].items():
         about = RUNS[kind] if kind in RUNS else OBJECTS[kind]
@@ -210,7 +211,7 @@ def test_what_is_merged_reflects_as_each_would(found):
 
 @pytest.mark.parametrize("kind", [k for k, about in OBJECTS.items() if about.shape in ("stick", "rod")])
 def test_round_things_are_round_bodies(kind):
-    """So that their echo is a cylinder's closed form (`tests.propagation.test_curved`)."""
+    """Round small objects have the closed-form echo of cylinders (`tests.propagation.test_curved`)."""
     about = OBJECTS[kind]
     (body,), _ = recognise(shaped(about, np.array(about.most)))
     assert body.radius == pytest.approx(min(about.most[:2] if about.shape == "stick" else about.most[1:]) / 2)

@@ -1,4 +1,4 @@
-"""Buildings out of square: angles of the size that is built, planes that stay planes, and what a corner echoes then."""
+"""Buildings out of square: realistic angles, planes that stay planes, and the echo of their corners."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ BUILDING = Building(kind="C", seed=4, furnished=False)
 
 
 def slants(by):
-    """Angles between the walls along x and along y less 90 deg, and of both from upright."""
+    """Angles between the walls along x and along y less 90 deg, and of both from the vertical."""
     across_x, across_y = (np.linalg.inv(by).T @ axis for axis in np.eye(3)[:2])  # normals
     cosine = across_x @ across_y / np.linalg.norm(across_x) / np.linalg.norm(across_y)
     return abs(np.arcsin(cosine)), *(abs(np.arctan2(n[2], np.hypot(n[0], n[1]))) for n in (across_x, across_y))
@@ -32,8 +32,8 @@ def test_angles_are_those_that_are_built(level):
 
 
 def test_the_drawing_itself():
-    """Without unevenness the same objects; with it, the default, the same triangles, a few centimetres off, and floors
-    level."""
+    """Without unevenness the same objects; with it, the default, the same triangles shifted by a few centimetres, and
+    floors level."""
     drawn = BUILDING.build()
     assert out_of_square(drawn, 0.0, 4) is drawn
     _, objects, *_ = built({"building": BUILDING.model_dump(), "clutter": 0}, "c", None)
@@ -54,7 +54,7 @@ def sizes(mesh):
 
 
 def test_planes_stay_planes():
-    """As many flat parts as drawn, which neither overlap nor leave anything out."""
+    """As many flat parts as drawn, without overlaps and gaps."""
     drawn = [item for item in BUILDING.build() if "wall" in item.name]
     for one, two in zip(drawn, out_of_square(drawn, 1.0, 4), strict=True):
         found = sizes(two.mesh)
@@ -64,7 +64,7 @@ def test_planes_stay_planes():
 @pytest.mark.parametrize("off", [-1.0, -0.3, 0.0, 0.3, 1.0])
 @pytest.mark.parametrize("distance", [1.0, 3.0])
 def test_a_corner_out_of_square(off, distance):
-    """Each order of its walls makes an image, at the place and as strong as half a plane's diffraction says."""
+    """Each order of its walls makes an image, with the position and strength of half a plane's diffraction."""
     angle = np.deg2rad(off)
     walls, position = corners.out_of_square(angle), np.array([distance, 0.0, 0.0])
     assert np.all(np.einsum("md,md->m", walls.normal, position - walls.center) > 0)

@@ -1,4 +1,4 @@
-"""The places of the multipath stress test do what they are there for, more at every level."""
+"""Places of the multipath stress test have their effect, and more of it at every level."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from radarsim.motion.statistics import crossings
 from radarsim.motion.walk import Walk
 from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Scenario
-from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.by_path_type import PARTS
 from radarsim.sensors.ghosts import DEPTH, NOISE, Ghosts
 from radarsim.sensors.scan import PlanarScan
 from radarsim.world.scene import Scene
@@ -21,18 +21,18 @@ TASKS = Specification.load("stress").tasks
 
 
 def caused_by(*causes: PathType) -> Callable[[dict[str, np.ndarray], np.ndarray], float]:
-    """Share of the cells above the noise that these causes fill."""
+    """Fraction of the cells above the noise with these path types."""
 
     def share(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
         cause = seen["truth/cause"]
-        heard = (cause != NOISE) & (cause != CAUSES.index("leakage"))
+        heard = (cause != NOISE) & (cause != PARTS.index("leakage"))
         return float(np.isin(cause, causes)[heard].mean())
 
     return share
 
 
 def before_the_surface(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
-    """Share of the cells in front of the first surface in which something is 20 dB above the noise."""
+    """Fraction of the cells in front of the first surface that are 20 dB above the noise."""
     power = 10 ** (seen["truth/cause_power"].astype(float) / 10)
     noise = power.min() * 10 ** (DEPTH / 10)  # kept no lower than so far below it
     ranges = CONFIG.ranges[:, None]
@@ -42,7 +42,7 @@ def before_the_surface(seen: dict[str, np.ndarray], true: np.ndarray) -> float:
 
 #: What rises with the level, and by how much at least from `FIRST` to level 3. The ladder starts from rooms with some
 #: clutter: diffuse multipath makes ghosts, too, and at level 1 it drowns those of the place.
-CLAIMS = {
+EXPECTED = {
     "corner": (caused_by(PathType.GHOST), 0.15),
     "cul-de-sac": (caused_by(PathType.GHOST), 0.08),
     "glass-corridor": (caused_by(PathType.GHOST, PathType.THROUGH_SLAB), 0.1),
@@ -58,10 +58,10 @@ CLAIMS = {
 FIRST = {"shelves": 1, "overhead": 1}
 
 
-@pytest.mark.parametrize("place", CLAIMS)
+@pytest.mark.parametrize("place", EXPECTED)
 def test_every_level_is_worse_than_the_one_before(place):
     tasks = [task for task in TASKS if task.building == place]
-    measure, least = CLAIMS[place]
+    measure, least = EXPECTED[place]
     found, motion = [], None
     for task in tasks:
         scene = Scene.load(task.scene)

@@ -116,7 +116,7 @@ class Training:
             output.with_suffix(".checkpoint").unlink(missing_ok=True)
             write_whole(begun, json.dumps(self.identity(), indent=1))
         try:
-            train(self.kind, self.data, output, self.settings, TrainOptions(self.split, resume=True), say=say)
+            train(self.kind, self.data, output, self.settings, TrainOptions(self.split, resume=True), log=say)
         except InputError as error:
             raise InputError(f"{self.kind} could not be trained: {error}") from error
         return {"log": lines}

@@ -32,7 +32,7 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     folder, others = RunFolder(run), [RunFolder(other) for other in beside]
     errors = trajectory_errors(folder) if folder.has("reference.tum") else {}
     metrics = evaluate(folder, errors=errors) if errors else {}
-    blind = folder.blind
+    blind = folder.unobservable_spans
 
     page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:

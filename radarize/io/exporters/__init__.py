@@ -1,4 +1,4 @@
-"""Recordings and runs as files for other programs, one module per format."""
+"""Export of recordings and runs to formats of other programs, one module per format."""
 
 import inspect
 from collections.abc import Callable
@@ -7,8 +7,8 @@ from pathlib import Path
 from radarize.io.errors import InputError
 from radarize.io.plugins import Plugins
 
-#: Formats by name: entry points of the group ``radarize.exporters``, functions such as `plain.export_tum`: source,
-#: output and, by keyword, progress and those of the options `run`, `iq_order` and `time_offset` that the format has.
+#: Formats by name: entry points of the group ``radarize.exporters``, functions such as `plain.export_tum` of source and
+#: output, with the keywords progress and those of `run`, `iq_order` and `time_offset` that the format has.
 FORMATS: Plugins[Callable[..., Path]] = Plugins("radarize.exporters", "export format")
 
 

@@ -1,4 +1,4 @@
-"""ROS 2 bags written through the `rosbags` library, whole or not at all.
+"""Writer of ROS 2 bags with the `rosbags` library; a bag is complete or absent.
 
 Version 8 of the format with sqlite3 storage is what every ROS 2 distribution since Humble plays.
 """
@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from radarize.io.replacing import new_folder
 
 _NEVER = QosTime(0, 0)
-#: Latched: who subscribes later gets it too, as /tf_static is meant to be.
+#: Latched, as /tf_static should be: a later subscriber receives it too.
 _LATCHED = Qos(
     QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, _NEVER, _NEVER,
     QosLiveliness.AUTOMATIC, _NEVER, False,
@@ -24,37 +24,37 @@ _TYPES = get_typestore(Stores.ROS2_HUMBLE)
 
 
 class Message(Protocol):
-    """A message of the `rosbags` library."""
+    """Interface of messages of the `rosbags` library."""
 
     __msgtype__: ClassVar[str]
 
 
 def message(kind: str, **fields: Any) -> Message:
-    """A message of a type such as ``sensor_msgs/msg/Imu``."""
+    """Return a message of a type such as ``sensor_msgs/msg/Imu``."""
     return _TYPES.types[kind](**fields)
 
 
 def header(time: float, frame: str) -> Message:
-    """A header with a stamp, s, and the frame that its message is given in."""
+    """Return a header with a stamp, s, and a coordinate frame."""
     nanoseconds = round(1e9 * time)
     stamp = message("builtin_interfaces/msg/Time", sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
     return message("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
 
 def vector(values: np.ndarray, kind: str = "Vector3") -> Message:
-    """Three or four numbers as ``geometry_msgs`` Vector3, Point or Quaternion."""
+    """Return three or four numbers as ``geometry_msgs`` Vector3, Point or Quaternion."""
     return message(f"geometry_msgs/msg/{kind}", **dict(zip("xyzw", map(float, values), strict=False)))
 
 
 class BagWriter:
-    """A ROS 2 bag that takes its place when it is whole; use as a context manager.
+    """Context manager that writes a ROS 2 bag, which appears under its name when it is complete.
 
     Args:
-        path: folder to write; must not be there, or be empty.
-        later: s, added to all stamps.
+        path: folder to write; must be absent or empty.
+        later: time added to all stamps, s.
 
     Raises:
-        InputError: it is there, or cannot be written.
+        InputError: the folder is not empty, or cannot be written.
     """
 
     def __init__(self, path: Path, later: float = 0.0):
@@ -73,7 +73,7 @@ class BagWriter:
         self._open.__exit__(*error)
 
     def write(self, topic: str, time: float, content: Any) -> None:
-        """Append a message, received at `time`, s; its stamps are moved, too, and it is not to be used again."""
+        """Append a message, received at `time`, s; its stamps are shifted in place, so do not use it again."""
         kind = content.__msgtype__
         if topic not in self._connections:
             latched = (_LATCHED,) if topic == "/tf_static" else ()

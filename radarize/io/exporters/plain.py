@@ -1,5 +1,5 @@
-"""Files that say nothing of this package: raw samples as an IWR1843 with a DCA1000 leaves them (``NAME.bin`` and
-``NAME.cfg``), trajectories as TUM files, maps for ROS's map_server."""
+"""Export to common file formats: raw samples as from an IWR1843 with a DCA1000 (``NAME.bin`` and ``NAME.cfg``),
+trajectories as TUM files, maps for ROS's map_server."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -19,13 +19,13 @@ _BATCH_BYTES = 16 << 20
 def export_bin(
     source: Path, output: Path, *, iq_order: str | None = None, progress: Callable[[int, int], None]
 ) -> Path:
-    """Write a recording's samples; ``.bin`` and ``.cfg`` are put in place of either suffix of `output`.
+    """Write a recording's samples as ``.bin`` and ``.cfg``, with the stem of `output`.
 
-    Words are in groups of four, ``Q0 Q1 I0 I1`` (``qqii``) or ``I0 I1 Q0 Q1`` (``iiqq``), and the third number of
-    ``adcbufCfg`` says which: 1 or 0.
+    Words are in groups of four, ``Q0 Q1 I0 I1`` (``qqii``) or ``I0 I1 Q0 Q1`` (``iiqq``); the third number of
+    ``adcbufCfg`` is 1 or 0 accordingly.
 
     Raises:
-        InputError: no recording, an unknown order, or a file cannot be written.
+        InputError: not a recording, an unknown order, or a file cannot be written.
     """
     with Recording(source) as recording:
         config = recording.config if iq_order is None else recording.config.changed("--iq-order", iq_order=iq_order)
@@ -36,7 +36,9 @@ def export_bin(
         with suppress(InputError):
             if recording.cfg_text and parse_cfg(recording.cfg_text) == config:
                 lacking = [line for line in cfg_headers(config) if line.split(":")[0] not in recording.cfg_text]
-                text = "\n".join([*lacking, recording.cfg_text])  # with its own comments, since it says the same
+                text = "\n".join(
+                    [*lacking, recording.cfg_text]
+                )  # the original text, with its comments, if it is equivalent
 
         with replacing(settings) as part:
             part.write_bytes(text.encode())
@@ -48,7 +50,7 @@ def export_bin(
 
 
 def export_tum(source: Path, output: Path, *, progress: Callable[[int, int], None]) -> Path:
-    """Write the trajectory of a run, or the true poses of a recording as far as they are known.
+    """Write the trajectory of a run, or the known true poses of a recording, as a TUM file.
 
     Raises:
         InputError: there is none, or the file cannot be written.
@@ -62,7 +64,7 @@ def export_tum(source: Path, output: Path, *, progress: Callable[[int, int], Non
 
 
 def export_map(source: Path, output: Path, *, progress: Callable[[int, int], None]) -> Path:
-    """Write a run's map as ``NAME.pgm`` and ``NAME.yaml``.
+    """Write the map of a run as ``NAME.pgm`` and ``NAME.yaml``.
 
     Raises:
         InputError: `source` is no run with a map, or a file cannot be written.

@@ -1,4 +1,4 @@
-"""Points as PLY, for MeshLab, CloudCompare, Open3D and others: those of a recording, or the scans of a run."""
+"""Export of points as PLY, for MeshLab, CloudCompare, Open3D and others: points of a recording, or scans of a run."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -19,11 +19,11 @@ _KINDS = {"f8": "double", "f4": "float", "i4": "int"}
 
 
 def export_ply(source: Path, output: Path, *, progress: Callable[[int, int], None]) -> Path:
-    """Write ``NAME.ply``, binary, a vertex a point: x, y, z (m), time (s), frame, and of a recording velocity (m/s,
-    closing positive), snr and noise (dB).
+    """Write ``NAME.ply``, binary, with a vertex per point: x, y, z (m), time (s), frame; for a recording also velocity
+    (m/s, closing positive), snr and noise (dB).
 
-    Points of a recording are those that it holds, else those that the radar's firmware would have found. They lie in
-    the world where true poses are known, else in the sensor's frame. Scans of a run lie in its map.
+    Points of a recording are the stored ones, or else those that the radar's firmware would detect. They are in the
+    world frame if true poses are known, else in the sensor frame. Scans of a run are in the frame of its map.
 
     Raises:
         InputError: a run without scans, or the file cannot be written.
@@ -42,9 +42,9 @@ def write_ply(
     """Write points as a binary little-endian PLY file.
 
     Args:
-        path: of it.
-        xyz: m.
-        fields: further numbers of each point, float64, float32 or int32, by name.
+        path: file to write.
+        xyz: positions, m.
+        fields: further values per point, float64, float32 or int32, by name.
 
     Raises:
         InputError: it cannot be written.
@@ -62,7 +62,7 @@ def write_ply(
 
 
 def _scans(run: RunFolder) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Where beams of scans end, by the trajectory's poses."""
+    """Return the end points of scan beams, placed by the poses of the trajectory."""
     if not run.scans:
         raise InputError(f"{run.path}: has no scans.h5, expected a run with scans")
     times, slam = run.trajectory
@@ -81,7 +81,7 @@ def _scans(run: RunFolder) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 def _points(
     recording: Recording, progress: Callable[[int, int], None]
 ) -> tuple[tuple[np.ndarray, dict[str, np.ndarray]], str]:
-    """Points of all frames, and in which frame of reference they lie."""
+    """Return the points of all frames, and their frame of reference."""
     stored = recording.has("points/frame") and recording.has("points/cloud")
     maker = None if stored else PointClouds(recording.config)
     clouds = []

@@ -1,5 +1,4 @@
-"""A recording as a ROS 1 bag of the Radarize paper's data set: its published code makes a data set of the bag, trains,
-and finds odometry and scans.
+"""Export of a recording as a ROS 1 bag in the layout of the Radarize paper's data set, for the paper's published code.
 
     /radar0/radar_data  xwr_raw_ros/RadarFrameFull: words Q Q I I in firing order, no stamp in the header; received when
                         the burst is over
@@ -7,9 +6,9 @@ and finds odometry and scans.
     /camera/depth/image_rect_raw/compressedDepth  CompressedImage: 12 bytes and a PNG of 848 x 100 pixels, mm
     /ti_mmwave/radar_scan_pcl_0  PointCloud2: x, y, z, intensity (SNR, dB), velocity (receding positive)
 
-The published code takes all its stamps from the times of receipt. Its settings are those of one radar
-(``calib/1843/1843_v1.cfg``, preset ``radarize``) and of one lens: for another radar, let its ``RADAR_CONFIG`` name the
-``.cfg`` that ``--format bin`` writes.
+The published code uses the times of receipt as stamps. Its settings are those of one radar (``calib/1843/1843_v1.cfg``,
+preset ``radarize``) and of one lens: for another radar, set its ``RADAR_CONFIG`` to the ``.cfg`` that ``--format bin``
+writes.
 """
 
 import heapq
@@ -39,9 +38,9 @@ from radarize.signal.points import PointClouds
 
 RADAR, ODOMETRY, IMU = "/radar0/radar_data", "/tracking/odom/sample", "/tracking/imu"
 POINTS, DEPTH = "/ti_mmwave/radar_scan_pcl_0", "/camera/depth/image_rect_raw/compressedDepth"
-#: s, from pose to pose.
+#: s, interval between poses.
 _TICK = 1 / 200
-#: m/s, with which the published code computes ranges and speeds.
+#: m/s, speed of light in the published code.
 _LIGHT = 3e8
 _BATCH = 16
 _FLOAT32 = 7
@@ -57,7 +56,7 @@ def export_radarize_ae(
     """Write a bag, ``NAME.bag``; see `exporters.export`.
 
     Raises:
-        InputError: no recording, depth pictures of another lens, or the file cannot be written.
+        InputError: not a recording, depth images of another lens, or the file cannot be written.
     """
     output = output.with_suffix(".bag") if output.suffix != ".bag" else output
     with Recording(source) as recording, replacing(output) as part:
@@ -84,14 +83,14 @@ def _message(kind: str, **fields: Any) -> Any:
 
 
 def _header(time: float | None, frame: str = "") -> Any:
-    """A header with a stamp, s, or none."""
+    """Return a header with a stamp, s, or without one."""
     seconds, nanoseconds = divmod(0 if time is None else round(1e9 * time), 10**9)
     stamp = _message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
     return _message("std_msgs/msg/Header", seq=0, stamp=stamp, frame_id=frame)
 
 
 def _stamped(content: Any, later: int) -> Any:
-    """The message with its stamp, if there is one, moved by so many ns."""
+    """Return the message with its stamp, if it has one, shifted by `later` ns."""
     stamp = content.header.stamp
     if content.__msgtype__ != FRAME_TYPE:
         seconds, nanoseconds = divmod(stamp.sec * 10**9 + stamp.nanosec + later, 10**9)
@@ -117,7 +116,7 @@ def _frames(recording: Recording) -> Iterator[Event]:
 
 
 def _parameters(config: RadarConfig) -> dict[str, Any]:
-    """Fields of all frames, as xwr_raw_ros computes them of a configuration."""
+    """Return the fields common to all frames, computed from a configuration as in xwr_raw_ros."""
     loops, tx, rx, samples, _ = config.frame_shape
     enabled = sorted({transmitter for firing in config.tx for transmitter in fired(firing)})
     chirp = config.idle_time + config.ramp_end_time
@@ -143,7 +142,7 @@ def _parameters(config: RadarConfig) -> dict[str, Any]:
 
 
 def _poses(recording: Recording) -> Iterator[Event]:
-    """True poses at 200 Hz between those that are known: straight lines, and turns at constant speed."""
+    """Yield true poses at 200 Hz, interpolated linearly in position and at constant angular speed."""
     truth = recording.true_poses()
     if truth is None or len(truth[0]) < 2:
         return
@@ -165,7 +164,7 @@ def _poses(recording: Recording) -> Iterator[Event]:
 
 
 def _inertial(recording: Recording) -> Iterator[Event]:
-    """On the radar's axes."""
+    """Yield IMU samples on the axes of the radar."""
     if not recording.has("imu/time"):
         return
     level, none = _vector(np.array([0, 0, 0, 1]), "Quaternion"), np.zeros(9)
@@ -202,8 +201,8 @@ def _depth(recording: Recording) -> Iterator[Event]:
 
 
 def _points(recording: Recording) -> Iterator[Event]:
-    """The recording's points, else those that the radar's firmware would have found; the firmware takes receding speeds
-    for positive."""
+    """Yield the stored points, or else those that the radar's firmware would detect; receding speeds are positive, as
+    in the firmware."""
     stored = recording.has("points/frame") and recording.has("points/cloud")
     maker = None if stored else PointClouds(recording.config)
     end = recording.config.burst_time

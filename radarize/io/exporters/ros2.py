@@ -1,4 +1,4 @@
-"""A recording and what the pipeline made of it as a ROS 2 bag, for Cartographer, slam_toolbox, RViz and others.
+"""Export of a recording and its run as a ROS 2 bag, for Cartographer, slam_toolbox, RViz and others.
 
     of a run        /scan  LaserScan        /odom  Odometry        /tf  odom -> base_link
     of a recording  /radar/heatmap  PointCloud2 of the range-azimuth map, intensity in dB
@@ -6,11 +6,13 @@
                     /truth/odom  Odometry, the truth as far as it is known        /tf  world -> truth
     always          /tf_static  base_link -> radar, imu, camera_depth_frame -> camera_depth_optical_frame
 
-``base_link`` is the radar: x forward, y left, z up (REP 103). Nothing publishes ``map``: that is the SLAM's to do. The
-truth's frames hang below: ``odom -> world`` is fixed where both begin, so that drift shows; without a run, base_link
-is where the truth is, ``base_link -> world``. Either way a SLAM's ``map -> odom`` meets no second parent.
+``base_link`` is the radar: x forward, y left, z up (REP 103). ``map`` is left to the SLAM program. The frames of the
+truth are below: with a run, ``odom -> world`` is fixed such that both coincide at the start, so that drift is visible;
+without a run, ``base_link -> world`` places base_link at the true pose. In either case ``map -> odom`` of a SLAM
+program does not conflict with a second parent.
 
-Stamps near zero, a simulator's, are moved by 1,700,000,000 s (14 November 2023): ROS takes a stamp of zero for "none".
+Stamps near zero, as of a simulator, are shifted by 1,700,000,000 s (14 November 2023), since ROS treats a zero stamp as
+unset.
 """
 
 import heapq
@@ -31,15 +33,15 @@ from radarize.radar.config import RadarConfig
 from radarize.signal.heatmaps import Heatmaps
 from radarize.signal.points import COLUMNS
 
-#: When, on which topic, and what.
+#: Time (s), topic, message.
 Event = tuple[float, str, Message]
 BASE, ODOM, RADAR, WORLD, TRUTH = "base_link", "odom", "radar", "world", "truth"
-#: s: added to stamps of the first day of 1970.
+#: s, added to stamps of the first day of 1970; length of that day.
 EPOCH, _DAY = 1_700_000_000.0, 86_400.0
 CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
 _BATCH = 16
 _FLOAT32 = 7
-#: Data sets with a sensor's place on the radar, and the frame it is.
+#: Data sets with the pose of a sensor on the radar, and its coordinate frame.
 _MOUNTS = {"imu/mount": "imu", "truth/depth_mount": CAMERA}
 
 
@@ -51,17 +53,17 @@ def export_ros2(
     time_offset: float | None = None,
     progress: Callable[[int, int], None],
 ) -> Path:
-    """Write a bag from a recording, a run's folder, or a recording and its run; see `exporters.export`.
+    """Write a bag from a recording, a run folder, or a recording and its run; see `exporters.export`.
 
     Raises:
-        InputError: unusable source, a run of another recording, or `output` is there already.
+        InputError: unusable source, a run of another recording, or `output` exists.
     """
     if source.is_dir():
         if run is not None:
             raise InputError(f"{source}: is a run's folder, and {run} another, expected a recording and a run")
         log = Log.read(source)
         bag = BagWriter(output, stamp_offset(log.times, time_offset))
-        return _write(bag, [_scans(log, None), _odometry(log)], [], "/scan", partial(_tell, progress, len(log.times)))
+        return _write(bag, [_scans(log, None), _odometry(log)], [], "/scan", partial(_report, progress, len(log.times)))
     log_of_run = Log.read(run) if run is not None else None
     with Recording(source) as recording:
         if not len(recording):
@@ -74,15 +76,15 @@ def export_ros2(
             mounts += _world(recording, log_of_run)
         streams.append(_truth(recording, BASE if log_of_run is None else None))
         bag = BagWriter(output, stamp_offset(recording.times, time_offset))
-        return _write(bag, streams, mounts, "/radar/heatmap", partial(_tell, progress, len(recording)))
+        return _write(bag, streams, mounts, "/radar/heatmap", partial(_report, progress, len(recording)))
 
 
 def stamp_offset(times: Float[np.ndarray, "frame"], given: float | None) -> float:
-    """What is added to stamps, s: see `exporters.export`."""
+    """Return the time added to stamps, s, see `exporters.export`."""
     return given if given is not None else EPOCH if len(times) and abs(times[0]) < _DAY else 0.0
 
 
-def _tell(progress: Callable[[int, int], None], total: int, done: int) -> None:
+def _report(progress: Callable[[int, int], None], total: int, done: int) -> None:
     progress(done, total)
 
 
@@ -91,9 +93,9 @@ def _write(
     streams: list[Iterator[Event]],
     mounts: list[tuple[str, str, np.ndarray]],
     counted: str,
-    tell: Callable[[int], None],
+    report: Callable[[int], None],
 ) -> Path:
-    """Merge streams by time; progress goes by the messages of one topic."""
+    """Merge streams by time and write them; report progress by the messages of one topic."""
     done, placed = 0, False
     with bag:
         for time, topic, content in heapq.merge(*streams, key=lambda event: event[0]):
@@ -104,7 +106,7 @@ def _write(
             bag.write(topic, time, content)
             if topic == counted:
                 done += 1
-                tell(done)
+                report(done)
     return bag.path
 
 
@@ -119,7 +121,7 @@ def _check_pair(recording: Recording, log: Log, run: Path) -> None:
 
 # --- of a run ---------------------------------------------------------------------------------------------------------
 def _scans(log: Log, config: RadarConfig | None) -> Iterator[Event]:
-    """A LaserScan a frame; inf where nothing is seen, as REP 117 asks."""
+    """Yield a LaserScan per frame; inf means no echo, as in REP 117."""
     seen = log.ranges[np.isfinite(log.ranges)]
     farthest = config.max_range if config else float(seen.max(initial=0)) + 0.1
     step = float(log.azimuths[1] - log.azimuths[0])
@@ -133,8 +135,8 @@ def _scans(log: Log, config: RadarConfig | None) -> Iterator[Event]:
 
 
 def _odometry(log: Log) -> Iterator[Event]:
-    """Odometry with covariances of the way since the start and of the velocity since the pose before, and as a
-    transform. The first pose has the second one's velocity."""
+    """Yield odometry, with covariances of the pose since the start and of the velocity since the previous pose, and its
+    transform. The first pose has the velocity of the second."""
     count = len(log.odometry)
     poses, spreads = planar_poses(log.odometry), np.zeros((count, 3, 3))
     velocities, velocity_spreads = np.zeros((count, 3)), np.zeros((count, 3, 3))
@@ -162,7 +164,7 @@ def _odometry_message(
     twist: Float[np.ndarray, "6"],
     spread: Float[np.ndarray, "2 3 3"],
 ) -> Message:
-    """Of the second frame in the first; covariances of x, y and yaw of pose and twist."""
+    """Return odometry of the second frame in the first, with covariances of x, y and yaw of pose and twist."""
     covariance = np.zeros((2, 6, 6))
     covariance[np.ix_([0, 1], [0, 1, 5], [0, 1, 5])] = spread
     place = message(
@@ -185,12 +187,12 @@ def _transform(time: float, frame: str, child: str, pose: Float[np.ndarray, "7"]
 
 # --- of a recording ---------------------------------------------------------------------------------------------------
 def _middles(recording: Recording) -> Float[np.ndarray, "frame"]:
-    """Stamps of the middles of the bursts, s, which is what frames are of."""
+    """Return stamps of the middle of the bursts, s, the time that frames refer to."""
     return recording.times + recording.config.burst_center
 
 
 def _mounts(recording: Recording) -> list[tuple[str, str, np.ndarray]]:
-    """Places of the other sensors on the radar, where the recording has them."""
+    """Return the poses of other sensors on the radar, if the recording has them."""
     found = [(BASE, frame, recording.read(name)) for name, frame in _MOUNTS.items() if recording.has(name)]
     return [*found, (CAMERA, OPTICAL, np.array([0.0, 0, 0, *OPTICAL_TURN]))]
 
@@ -229,7 +231,7 @@ def _cloud(time: float, cells: Float[np.ndarray, "row column field"], names: tup
 
 
 def _truth(recording: Recording, base: str | None) -> Iterator[Event]:
-    """The truth as odometry and as a transform; the world is placed on `base` where that is given."""
+    """Yield the truth as odometry and as a transform; the world is placed relative to `base` if given."""
     if not (recording.has("truth/pose") and recording.has("truth/time")):
         return
     times, poses = recording.read("truth/time"), recording.read("truth/pose")
@@ -244,8 +246,7 @@ def _truth(recording: Recording, base: str | None) -> Iterator[Event]:
 
 
 def _world(recording: Recording, log: Log) -> list[tuple[str, str, np.ndarray]]:
-    """The world's place in odometry's frame: both are one at the first pose of the odometry after which truth is
-    known."""
+    """Return the pose of the world in the odometry frame: both coincide at the first odometry pose with known truth."""
     truth = recording.true_poses()
     if truth is None or not len(truth[0]) or not len(log.odometry):
         return []
@@ -254,7 +255,7 @@ def _world(recording: Recording, log: Log) -> list[tuple[str, str, np.ndarray]]:
 
 
 def _depth(recording: Recording) -> Iterator[Event]:
-    """Depth pictures in mm, and the camera's pinhole model with each."""
+    """Yield depth images in mm, each with the camera's pinhole model."""
     if not recording.has("truth/depth"):
         return
     pinhole = recording.read("truth/depth_intrinsics") if recording.has("truth/depth_intrinsics") else None

@@ -1,13 +1,13 @@
-"""A recording as a sequence in roverd's layout, which `radarize.io.importers.rover` describes: the format of the data
-set I/Q-1M, on which nrdk trains.
+"""Export of a recording as a sequence in roverd's layout, described in `radarize.io.importers.rover`: the format of the
+data set I/Q-1M, on which nrdk trains.
 
     SEQUENCE/config.yaml         chirps, in GHz, MHz/us, us, ksps and ms
              radar/meta.json     type and shape of each channel        radar/radar.json  resolutions, order of chirps
              radar/iq, ts, valid words Q Q I I; stamps, s; 0 of frames that lost packets
              _radar/pose.npz     true poses: t (s), pos (m), rot (matrices), vel (m/s) and acc (m/s^2) in the world
 
-Transmitters are in the order TX1, TX2, TX3, by which xwr and nrdk place the antennas, whatever order they fired in; the
-latter stands in radar.json as ``tx_order``.
+Transmitters are in the order TX1, TX2, TX3, from which xwr and nrdk place the antennas, independent of the firing
+order, which is stored in radar.json as ``tx_order``.
 """
 
 import json
@@ -26,7 +26,7 @@ from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig, fired, firing_name
 from radarize.radar.dca1000 import encode
 
-#: The rigs' names of transmitters that fire: with two, the raised one in the middle of the row is left out.
+#: Firing transmitters of the rigs; with two, the elevated one in the middle of the row is left out.
 _TRANSMITTERS = ((0,), (0, 2), (0, 1, 2))
 _BATCH_BYTES = 16 << 20
 _CHANNELS = {
@@ -37,10 +37,10 @@ _CHANNELS = {
 
 
 def export_roverd(source: Path, output: Path, *, progress: Callable[[int, int], None]) -> Path:
-    """Write a sequence; see `exporters.export`.
+    """Write a recording as a roverd sequence; see `exporters.export`.
 
     Raises:
-        InputError: no recording, transmitters that no rig has, or the folder is there already.
+        InputError: not a recording, transmitters that no rig has, or the folder exists.
     """
     with Recording(source) as recording, new_folder(output, "sequence") as folder:
         config = recording.config
@@ -84,7 +84,7 @@ def _resolutions(config: RadarConfig) -> dict[str, object]:
 
 
 def _chirps(config: RadarConfig) -> dict[str, object]:
-    """As the rig's program has them."""
+    """Return the chirp parameters as the rig's program stores them."""
     return {
         "device": load_board(config.board).chip.upper().replace("IWR", "AWR"),
         "frequency": _round(config.start_frequency / 1e9),
@@ -101,12 +101,12 @@ def _chirps(config: RadarConfig) -> dict[str, object]:
 
 
 def _round(value: float) -> float:
-    """Without what a change of units adds: 20.0, not 19.999999999999996."""
+    """Remove rounding errors of a change of units: 20.0, not 19.999999999999996."""
     return float(f"{value:.12g}")
 
 
 def _poses(recording: Recording) -> dict[str, Float[np.ndarray, "pose ..."]] | None:
-    """True poses, with velocities and accelerations in the world; None without truth."""
+    """Return true poses, with velocities and accelerations in the world; None without truth."""
     truth = recording.true_poses()
     if truth is None or len(truth[0]) < 2:
         return None

@@ -1,8 +1,8 @@
-"""Recordings from foreign files, one module per format.
+"""Import of recordings from other formats, one module per format.
 
-A `Format` opens its files as a `Capture`: samples in batches of whole frames, with whatever came along. What follows is
-the same for all: settle the order of I and Q, stamp the frames, write the recording. Other packages add formats by
-entry points of the group ``radarize.importers``.
+A `Format` opens its files as a `Capture`: samples in batches of complete frames, with further data. The next steps are
+the same for all formats: determine the order of I and Q, stamp the frames, write the recording. Other packages add
+formats by entry points of the group ``radarize.importers``.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,11 +27,11 @@ from radarize.radar.dca1000 import range_balance
 
 __all__ = ["Given", "captures", "import_recording"]
 
-#: From this many dB on, the samples themselves say which of I and Q comes first.
+#: dB from which on the samples determine the order of I and Q.
 _CERTAIN_DB = 10.0
-#: Frames that are asked.
+#: Number of frames examined for it.
 _ASKED = 8
-#: What poses given by hand stand in for.
+#: Streams that poses from a file replace.
 _POSES = ("truth/time", "truth/pose", "truth/velocity")
 
 
@@ -41,21 +41,21 @@ def import_recording(
     given: Given | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write a recording (.h5) from a capture.
+    """Write a recording (.h5) from a capture of another format.
 
-    Frames are stamped as the source says, else ``start_time + index * frame_period``. What the user should know (a
-    truncated last frame, lost packets, doubtful settings) is joined in the recording's attribute ``warnings``; settings
-    that nobody gave are named in ``assumed``; what the samples told of them is in ``found``.
+    Frames are stamped as in the source, else ``start_time + index * frame_period``. The recording's attribute
+    ``warnings`` lists what the user should know (a truncated last frame, lost packets, doubtful settings), ``assumed``
+    the settings that were assumed, and ``found`` those determined from the samples.
 
     Args:
         source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
-            lie beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an
-            array of samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or RadarHD's data set of
-            pictures, of which ``given.walk`` is taken.
-        output: recording to write; of a network capture with several starts of the radar, boards or ports, each is
-            written, the second to ``NAME-2.h5``, unless ``given.capture`` says which.
-        given: what the user says of it.
-        progress: called with frames done and (estimated) frames in all.
+            be beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an
+            array of samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or a walk (``given.walk``)
+            of RadarHD's data set of images.
+        output: recording to write; if a network capture has several starts of the radar, boards or ports, each is
+            written, the second to ``NAME-2.h5``, unless ``given.capture`` selects one.
+        given: settings from the user.
+        progress: called with (frames done, estimated frames in all).
 
     Raises:
         InputError: unknown format, nothing usable in the source, or a configuration that does not fit it.
@@ -79,8 +79,8 @@ def import_recording(
         raise InputError(f"{source}: has stamps of its own, but start_time is {given.start_time}, expected none")
     if "tx_order" in capture.assumed:
         capture.warnings.append(
-            "one chirp a loop is assumed, of TX1: of a capture with two transmitters, all speeds would be doubled; "
-            "--tx says how many there are"
+            "a single chirp per loop, of TX1, is assumed; if the capture has two transmitters, all speeds are doubled: "
+            "give the number of transmitters with --tx"
         )
     capture.warnings += _of_the_radar(capture, given)
     radar, swapped = _settle_iq_order(capture, first, "iq_order" in given.overrides)
@@ -106,22 +106,22 @@ def import_recording(
             progress(done, max(done, capture.expected_frames))
         if given.poses:
             end = last + radar.frame_period
-            capture.warnings += _apart(products["truth/time"].data, start_time, end, given.poses)
+            capture.warnings += _overlap_warning(products["truth/time"].data, start_time, end, given.poses)
         capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
 
 
 def _of_the_radar(capture: Capture, given: Given) -> list[str]:
-    """The board that is assumed where neither capture nor user names one, and what the firing order costs."""
+    """Return a warning about an assumed board, and remarks on losses due to the firing order."""
     if given.overrides.get("board") is not None:
         return losses(capture.config)
-    unsaid = not capture.cfg_text and given.config is None and not capture.board_known
-    return [*([assumed_board(capture.config)] if unsaid else []), *remarks(capture.cfg_text, capture.config)]
+    unnamed = not capture.cfg_text and given.config is None and not capture.board_known
+    return [*([assumed_board(capture.config)] if unnamed else []), *remarks(capture.cfg_text, capture.config)]
 
 
 def captures(source: Path, given: Given) -> Sequence[str]:
-    """What captures a source holds, in words; none where its format holds one alone.
+    """Return descriptions of the captures in a source; none if its format has a single one.
 
     Raises:
         InputError: unknown format.
@@ -131,36 +131,36 @@ def captures(source: Path, given: Given) -> Sequence[str]:
 
 
 def _import_all(source: Path, output: Path, given: Given, count: int, progress: Callable[[int, int], None]) -> Path:
-    """Write a recording of each capture that a source holds; of the second one into ``NAME-2.h5``. Returns the first.
+    """Write a recording of each capture in a source, the second one to ``NAME-2.h5``, and return the first.
 
     Raises:
-        InputError: one of the files is there, but for the first; or no capture can be read.
+        InputError: one of the files but the first exists, or no capture can be read.
     """
     outputs = [output, *(output.with_stem(f"{output.stem}-{number}") for number in range(2, count + 1))]
     for number, path in enumerate(outputs[1:], 2):
         if path.exists():
             raise InputError(
-                f"{path}: is there already, and capture {number} of {count} in {source} would go there, expected "
+                f"{path}: already exists, and capture {number} of {count} in {source} would replace it, expected "
                 f"another output, or capture, 1 to {count}"
             )
-    written, told = [], []
+    written, notes = [], []
     for number, path in enumerate(outputs, 1):
         try:
             written.append(import_recording(source, path, replace(given, capture=number), progress))
-            told.append(f"capture {number} is in {path}")
+            notes.append(f"capture {number} is in {path}")
         except InputError as error:
             failed = error
-            told.append(f"capture {number} is left out ({error})")
+            notes.append(f"capture {number} is left out ({error})")
     if not written:
         raise failed
     for path in written:
         with open_hdf5(path, mode="r+") as file:
-            file.attrs["warnings"] = "; ".join([*filter(None, [str(file.attrs.get("warnings", ""))]), *told])
+            file.attrs["warnings"] = "; ".join([*filter(None, [str(file.attrs.get("warnings", ""))]), *notes])
     return written[0]
 
 
 def _poses(path: Path) -> dict[str, Product]:
-    """True poses of a TUM file as data sets of a recording, at their own times."""
+    """Return the poses of a TUM file as data sets of a recording, at their own times."""
     times, poses = read_tum(path)
     return {
         "truth/time": Product(times, "s", f"stamps of the poses of {path.name}"),
@@ -168,21 +168,21 @@ def _poses(path: Path) -> dict[str, Product]:
     }
 
 
-def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str]:
-    """A warning if no pose falls into the recording: two clocks, most likely."""
+def _overlap_warning(times: np.ndarray, start: float, end: float, poses: Path) -> list[str]:
+    """Return a warning if no pose is within the time of the recording, probably because of two clocks."""
     if times[-1] >= start and times[0] <= end:
         return []
     return [
         f"{poses} covers {times[0]:.3f} to {times[-1]:.3f} s, but the frames {start:.3f} to {end:.3f} s: "
-        "give start_time to bring both to one clock"
+        "give start_time to put both on one clock"
     ]
 
 
 def _format(source: Path, given: Given) -> Format:
-    """The format of a source.
+    """Return the format of a source.
 
     Raises:
-        InputError: none that is known, or what the user says belongs to another format.
+        InputError: the format is unknown, or an option belongs to another format.
     """
     formats = sorted(FORMATS.values(), key=lambda each: each.last)
     expected = ", ".join(each.expected for each in formats)
@@ -199,9 +199,9 @@ def _format(source: Path, given: Given) -> Format:
 
 
 def _settle_iq_order(capture: Capture, batch: CapturedFrames, given: bool) -> tuple[RadarConfig, bool]:
-    """The configuration with the I/Q order that the samples show if it is assumed, and whether to swap them.
+    """Return the configuration with the I/Q order that the samples show, if it was assumed, and whether to swap them.
 
-    Where the configuration says and they contradict it, there is a warning.
+    If the samples contradict a given order, a warning is added.
     """
     config = capture.config
     decibels = range_balance(batch.frames[:_ASKED])

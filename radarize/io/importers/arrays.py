@@ -1,4 +1,4 @@
-"""Arrays in files, read slice by slice: ``.npy``, ``.npz`` and MATLAB's ``.mat``. Nothing in them is ever executed."""
+"""Arrays in files, read in slices: ``.npy``, ``.npz`` and MATLAB's ``.mat``. Nothing in them is executed."""
 
 import math
 import tempfile
@@ -18,17 +18,17 @@ from radarize.io.npyfile import npy_header, open_npz
 
 #: Bytes of a compressed member unpacked at a time.
 _PIECE = 1 << 18
-#: Of entries, as numpy calls them: numbers, and pairs of them.
+#: Kinds of entries, as in numpy: numbers, and pairs of them.
 _KINDS = "iufcV"
 
 
 class ArrayFile(ABC):
-    """An array in a file.
+    """Interface of an array in a file.
 
     Attributes:
-        name: what errors call it.
-        shape: of the array.
-        dtype: of its entries, complex for pairs of real and imaginary part.
+        name: name in errors.
+        shape: shape of the array.
+        dtype: type of its entries, complex for pairs of real and imaginary part.
     """
 
     name: str
@@ -36,17 +36,17 @@ class ArrayFile(ABC):
     dtype: np.dtype
 
     def take(self, axis: int, start: int, stop: int) -> np.ndarray:
-        """Entries start...stop-1 along an axis."""
+        """Return entries start to stop - 1 along an axis."""
         return self._take(tuple(slice(start, stop) if k == axis else slice(None) for k in range(len(self.shape))))
 
     @abstractmethod
     def _take(self, where: tuple[slice, ...]) -> np.ndarray: ...
 
     def reshaped(self, shape: tuple[int, ...]) -> None:
-        """Take the entries in their order for an array of another shape.
+        """Interpret the entries in their order as an array of another shape.
 
         Raises:
-            InputError: it has another number of entries, or its entries cannot be put in one order.
+            InputError: the number of entries differs, or their order is not unique.
         """
         if math.prod(shape) != math.prod(self.shape):
             raise InputError(
@@ -62,7 +62,7 @@ class ArrayFile(ABC):
 
 
 class MappedArray(ArrayFile):
-    """An array at some place of a file; mapped anew for every slice, so that what was read can be forgotten."""
+    """An array at an offset in a file; mapped again for every slice, so that memory of earlier slices is released."""
 
     def __init__(self, name: str, path: Path, header: tuple[tuple[int, ...], bool, np.dtype], offset: int):
         self.name, self._path, self._offset = name, path, offset
@@ -99,7 +99,7 @@ class MemberArray(MappedArray):
 
 
 class MemoryArray(ArrayFile):
-    """An array of a ``.mat`` file up to version 7, which has at most 2 GB and must be read at once."""
+    """An array in a ``.mat`` file up to version 7, which has at most 2 GB and must be read at once."""
 
     def __init__(self, name: str, values: np.ndarray):
         self.name, self.values, self.shape = name, values, values.shape
@@ -110,7 +110,7 @@ class MemoryArray(ArrayFile):
 
 
 class MatlabArray(ArrayFile):
-    """An array of a ``.mat`` file of version 7.3, which is HDF5 with all axes turned round."""
+    """An array in a ``.mat`` file of version 7.3, which is HDF5 with reversed axes."""
 
     def __init__(self, path: Path, variable: str | None):
         with ExitStack() as stack:
@@ -128,15 +128,15 @@ class MatlabArray(ArrayFile):
 
 
 def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
-    """Open an array.
+    """Open an array in a file.
 
     Args:
         path: ``.npy``, ``.npz`` or ``.mat``.
-        variable: which one of several; by default the only one that is numeric and has more than one axis.
-        folder: where a compressed array may be unpacked.
+        variable: name of the array; by default the only numeric one with more than one axis.
+        folder: folder for unpacking a compressed array.
 
     Raises:
-        InputError: not such a file, no such array, or one that does not hold numbers.
+        InputError: not such a file, no such array, or an array without numbers.
     """
     with explained(f"{path}: cannot be read"):
         if path.suffix.lower() == ".npz":
@@ -188,7 +188,7 @@ def _choose(path: Path, variable: str | None, shapes: dict[str, tuple[int, ...]]
 
 
 def _checked(stored: np.dtype, name: str) -> np.dtype:
-    """Type of the entries as numbers."""
+    """Return the type of the entries as numbers."""
     if stored.fields and len(stored.fields) == 2 and all(kind.kind in "iuf" for kind, *_ in stored.fields.values()):
         return np.dtype(np.complex64 if stored.itemsize <= 8 else np.complex128)
     if stored.kind not in "iufc":

@@ -1,6 +1,7 @@
-"""ROS bags of raw radar frames: the published Radarize data set's (ROS 1), and ROS 2 bags with the same topics.
+"""Import of ROS bags with raw radar frames: those of the published Radarize data set (ROS 1), and ROS 2 bags with the
+same topics.
 
-Other topics are stamped as their headers say, or with their receipt where those are not of the bag's clock.
+Other topics are stamped from their headers, or from their receipt if headers are not on the bag's clock.
 """
 
 import math
@@ -23,8 +24,8 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
 from radarize.radar.presets import PRESETS
 
-#: What may come along: the data set's topic, message types, and who takes it. Where there is no topic of that name,
-#: the only one of the type serves.
+#: Further topics of the data set: name, message types, and reader. If there is no topic of the name, the only one of
+#: the type is used.
 COMPANIONS: tuple[tuple[str, tuple[str, ...], type[Companion]], ...] = (
     ("/tracking/odom/sample", ("nav_msgs/msg/Odometry",), TrackedPose),
     ("/tracking/imu", ("sensor_msgs/msg/Imu",), InertialSensor),
@@ -36,25 +37,25 @@ COMPANIONS: tuple[tuple[str, tuple[str, ...], type[Companion]], ...] = (
     ),
 )
 _RADAR = "/radar0/radar_data"
-#: Of frames whose shape is that of the Radarize data set, which was made with this board.
+#: Assumption for frames with the shape of the Radarize data set, which was recorded with this board.
 OF_RADARIZE = "configuration: preset radarize"
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
-#: s: so much of the other topics is read ahead of the frames; messages are received that late at most.
+#: s, by which other topics are read ahead of the frames; maximum delay of received messages.
 _AHEAD = 0.5
 
 
 def open_bag(path: Path, given: Given) -> Capture:
-    """Open a bag.
+    """Open a ROS bag.
 
-    The radar's configuration is what was given, else the data set's own (preset ``radarize``) if the frames have its
-    size, else what the frames say and the user adds. Range bias and channel calibration come from the frames.
+    The radar configuration is the given one, else that of the data set (preset ``radarize``) if the frames have its
+    size, else from the frames and the user's options. Range bias and channel calibration come from the frames.
 
     Args:
-        path: a ROS 1 ``.bag``, a ROS 2 bag's folder, or its ``.mcap`` or ``.db3``.
-        given: what is known of the radar and of its latency.
+        path: a ROS 1 ``.bag``, the folder of a ROS 2 bag, or its ``.mcap`` or ``.db3``.
+        given: settings of the radar and its latency.
 
     Raises:
-        InputError: no readable bag, one without raw frames, or frames that do not fit the configuration.
+        InputError: not a readable bag, one without raw frames, or frames that do not fit the configuration.
     """
     with Bag(path) as bag:
         radar, others, warnings = _topics(bag)
@@ -84,14 +85,14 @@ def open_bag(path: Path, given: Given) -> Capture:
 
 
 def _first(bag: Bag, topic: str) -> tuple[float, Message]:
-    """Time of receipt (s) and content of a topic's first message."""
+    """Return time of receipt (s) and content of a topic's first message."""
     for _, nanoseconds, message in bag.messages([topic]):
         return 1e-9 * nanoseconds, message
     raise InputError(f"{bag.path}: has no message on {topic}, though its index counts {bag.topics[topic][1]}")
 
 
 def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
-    """The topic of raw frames, those that come along, and what was ambiguous."""
+    """Return the topic of raw frames, the other topics to read, and warnings about ambiguity."""
     there = {topic: kind for topic, (kind, count) in bag.topics.items() if count}
     frames = [topic for topic, kind in there.items() if is_frame(kind)]
     if not frames:
@@ -102,7 +103,7 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
         )
     warnings = []
     if len(frames) > 1:
-        warnings.append(f"{bag.path}: has raw frames on {', '.join(frames)}, of which one is taken")
+        warnings.append(f"{bag.path}: has raw frames on {', '.join(frames)}, of which one is used")
     radar = _RADAR if _RADAR in frames else frames[0]
     others = {}
     for name, kinds, companion in COMPANIONS:
@@ -112,7 +113,7 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
         if name in found or len(found) == 1:
             others[name if name in found else found[0]] = companion
         elif found:
-            warnings.append(f"{bag.path}: has {', '.join(found)}, none of them {name}, and all are left out")
+            warnings.append(f"{bag.path}: has {', '.join(found)}, none of them {name}; all are left out")
     return radar, others, warnings
 
 
@@ -127,15 +128,15 @@ def _configure(path: Path, frame: Message, given: Given) -> tuple[RadarConfig, t
             f"{path}: has frames of shape {shape} with {len(tx)} transmitters and {len(rx)} receivers, expected loops "
             "x transmitters x receivers x samples"
         )
-    said = {"samples": shape[-1], "loops": loops, "rx": rx, "tx": tx}
+    found = {"samples": shape[-1], "loops": loops, "rx": rx, "tx": tx}
     preset = PRESETS["radarize"]
-    if given.config is None and said == {name: getattr(preset, name) for name in said}:
+    if given.config is None and found == {name: getattr(preset, name) for name in found}:
         return given.or_else(preset, "").configure(str(path))[0], (OF_RADARIZE, "iq_order")
-    return given.configure(str(path), said)
+    return given.configure(str(path), found)
 
 
 def _antennas(field: int | np.ndarray) -> tuple[int, ...]:
-    """Antennas in use, 0-based, from a bit mask or from one truth value an antenna."""
+    """Return the enabled antennas, 0-based, from a bit mask or from one truth value per antenna."""
     values = [int(value) for value in np.atleast_1d(field)]
     if len(values) == 1 and values[0] > 1:
         return numbers(values[0])
@@ -143,7 +144,7 @@ def _antennas(field: int | np.ndarray) -> tuple[int, ...]:
 
 
 def _calibrated(config: RadarConfig, frame: Message, name: str, warnings: list[str]) -> RadarConfig:
-    """The configuration with the frame's calibration, unless it has one of its own."""
+    """Return the configuration with the frame's calibration, unless it has one already."""
     with explained(f"{name}: has frames without usable range_bias and rx_phase_bias"):
         pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
         bias = float(getattr(frame, "range_bias", 0.0))
@@ -152,16 +153,14 @@ def _calibrated(config: RadarConfig, frame: Message, name: str, warnings: list[s
         return config
     channels = config.channel_factors.size
     if pairs.size != 2 * channels or not np.isfinite([*pairs, bias]).all():
-        warnings.append(
-            f"rx_phase_bias has {pairs.size} numbers, expected {channels} pairs; no calibration is taken from it"
-        )
+        warnings.append(f"rx_phase_bias has {pairs.size} numbers, expected {channels} pairs; it is not used")
         return config
     factors = tuple((float(re), float(im)) for re, im in pairs.reshape(channels, 2))
     return config.changed(name, range_bias=bias, channel_calibration=factors)
 
 
 def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:
-    """Take the depth camera's pinhole model from its camera_info, if the bag has one."""
+    """Set the depth camera's pinhole model from its camera_info, if the bag has one."""
     for topic, companion in companions.items():
         folder = topic.removesuffix("/compressedDepth").rsplit("/", 1)[0]
         if isinstance(companion, Depth) and bag.topics.get(f"{folder}/camera_info", ("", 0))[0] == _CAMERA_INFO:
@@ -173,7 +172,7 @@ def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:
 
 
 def _turned(companions: dict[str, Companion], given: Given) -> tuple[str, ...]:
-    """Turn the IMU as the user says; returns ``imu/mount`` if nobody says how it stands."""
+    """Rotate the IMU as the user states; return ``imu/mount`` if its orientation is unknown."""
     sensors = [companion for companion in companions.values() if isinstance(companion, InertialSensor)]
     for sensor in sensors:
         if given.imu_turn is not None:
@@ -201,7 +200,7 @@ def _batches(
         for topic, nanoseconds, message in bag.messages([radar, *companions]):
             received = 1e-9 * nanoseconds
             now = stamps(message, received) if topic == radar else received
-            if frames.times and now > frames.last + 2 * _AHEAD:  # the radar is silent: nothing to wait for
+            if frames.times and now > frames.last + 2 * _AHEAD:  # the radar is silent, so nothing else will arrive
                 yield batch(size)
             elif len(frames.times) > size and now > frames.times[size] + _AHEAD:
                 yield batch(size)

@@ -1,6 +1,6 @@
-"""Raw ``.bin`` files of a DCA1000: nothing but words, from the first frame's start on.
+"""Import of raw ``.bin`` files of a DCA1000: words only, from the start of the first frame.
 
-Long captures come in parts, ``NAME_Raw_0.bin``, ``NAME_Raw_1.bin``, ..., cut anywhere, even within a word.
+Long captures are split into ``NAME_Raw_0.bin``, ``NAME_Raw_1.bin``, ... at any byte.
 """
 
 import re
@@ -22,18 +22,18 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout
 from radarize.radar.presets import load_config
 
-#: Bytes by which a capture is judged.
+#: Bytes that are examined for the encoding, and for the period.
 _LOOKED_AT, _PERIODS = 1 << 20, 1 << 21
-#: Times the configuration's loop that the samples' may be long: of three transmitters, where one is configured.
+#: Maximum ratio of the samples' loop to the configured one: three transmitters, where one is configured.
 _LONGEST = 3
-#: Share of the best correlation that a period has whose multiple is the best. From receiver to receiver it is up to
+#: Minimum ratio of a period's correlation to that of its multiple, which is the best. Between receivers it is up to
 #: 0.98 in the static room of the public IWR6843 capture.
 _AS_GOOD = 0.99
 _PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
 
 
 def parts(source: Path) -> tuple[Path, ...]:
-    """All files of the capture that a ``.bin`` belongs to, in order: itself, unless its name says that it is a part.
+    """Return all files of the capture that a ``.bin`` belongs to, in order: itself, unless its name is that of a part.
 
     Raises:
         InputError: a part is missing.
@@ -54,13 +54,13 @@ def parts(source: Path) -> tuple[Path, ...]:
 
 
 def whole_name(source: Path) -> Path:
-    """The name of a capture without the number of its part, where its settings may lie: ``NAME.cfg``."""
+    """Return the name of a capture without the number of its part; its settings may be in ``NAME.cfg``."""
     match = _PART.fullmatch(source.name)
     return source.with_name(match["name"] + ".bin") if match else source
 
 
 def all_zero(words: Int16[np.ndarray, "word"], config: RadarConfig) -> Bool[np.ndarray, "frame loop tx"]:
-    """Chirps (physical order) of nothing but zeros: capture programs put them where packets were lost."""
+    """Return chirps (physical order) with zeros only, which capture programs write where packets were lost."""
     loops, tx = config.frame_shape[:2]
     fired = np.any(words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)), axis=3)
     return ~fired[:, :, list(config.slot)]
@@ -78,18 +78,17 @@ def open_bin(
     """Open raw files that follow each other.
 
     Args:
-        encoding, layout: of their words, see `radarize.io.importers.words` and `radarize.io.importers.layout`.
+        encoding, layout: of the words, see `radarize.io.importers.words` and `radarize.io.importers.layout`.
 
-    Where bytes are missing, what follows is moved to where it belongs; from where on frames have another size, all is
-    left out, each with a warning (`radarize.io.importers.resync`). An incomplete last frame is left out with a warning,
-    unless the samples show that it is the configuration which does not fit; of words that are plainly something else
-    than `encoding` says there is a warning, too. Chirps of nothing but zeros count as lost: capture programs fill lost
-    packets with zeros.
+        Where bytes are missing, the following ones are moved to their correct place; if frames change their size, the
+        rest is left out; both give a warning (`radarize.io.importers.resync`). An incomplete last frame is left out
+        with a warning, unless the samples show that the configuration does not fit. Words that contradict `encoding`
+        give a warning too. Chirps with zeros only count as lost, since capture programs replace lost packets by zeros.
 
     Raises:
-        InputError: less than one frame, or the samples repeat with another period than the configuration's loop.
+        InputError: less than one frame, or the samples have another period than the configuration's loop.
     """
-    told, config = config, recorded(config, layout)
+    given, config = config, recorded(config, layout)
     check_layout(config)
     warnings = list(warnings)
     size = sum(path.stat().st_size for path in files)
@@ -105,8 +104,8 @@ def open_bin(
     pieces = Pieces([(range(size), 0)])
     if odd := oddity(begins, encoding):
         warnings.append(f"{name}: {odd}")
-    elif (other := likely(words, told, layout)) != layout:
-        warnings.append(f"{name}: its words look {other}, not {layout}; --layout {other} reads those")
+    elif (other := likely(words, given, layout)) != layout:
+        warnings.append(f"{name}: its words are probably {other}, not {layout}: use --layout {other}")
     elif layout == "pairs" and (period := other_period(read_range(files, 0, _PERIODS), config)):
         expected = tx * rx * samples
         message = (
@@ -124,7 +123,7 @@ def open_bin(
             if pieces.ends is not None:
                 warnings.append(
                     f"{name}: from byte {pieces.ends} on, samples repeat every {period} and not every "
-                    f"{tx * rx * samples} as before; {size - pieces.ends} bytes are left out, expected frames of a size"
+                    f"{tx * rx * samples} as before; {size - pieces.ends} bytes are left out, expected equal frames"
                 )
         if rest:
             warnings.append(
@@ -150,7 +149,7 @@ def _batches(
 
 
 def _judged(files: Sequence[Path], size: int, config: RadarConfig) -> tuple[Pieces, int | None]:
-    """Pieces of a capture, and the period of its samples from where they end, if they end early."""
+    """Return the pieces of a capture, and the period of the samples after them, if they end early."""
 
     def period(start: int) -> int | None:
         return other_period(read_range(files, start, start + _PERIODS), config)
@@ -160,14 +159,14 @@ def _judged(files: Sequence[Path], size: int, config: RadarConfig) -> tuple[Piec
 
 
 def other_period(data: bytes, config: RadarConfig) -> int | None:
-    """Complex samples after which the capture repeats, if that is clearly not the configuration's loop.
+    """Return the number of complex samples after which the capture repeats, if it differs from the configured loop.
 
-    Chirps of one transmitter and receiver look alike from loop to loop, so the magnitude of the autocorrelation peaks
-    at the loop's length. None where the peak is there, or nowhere distinct.
+    Chirps of one transmitter and receiver are similar from loop to loop, so the magnitude of the autocorrelation peaks
+    at the length of a loop. None if the peak is there, or nowhere distinct.
     """
     loop = config.frame_bytes // 4 // config.loops
     words = np.frombuffer(data, "<i2", len(data) // 8 * 4)
-    pairs = words.reshape(-1, 2, 2).astype(np.float32)  # either order of I and Q: the other is its mirror image
+    pairs = words.reshape(-1, 2, 2).astype(np.float32)  # the other order of I and Q gives the mirror image
     signal = (pairs[:, 0] + 1j * pairs[:, 1]).reshape(-1)
     signal -= signal.mean()
     longest = min(_LONGEST * loop, len(signal) // 2)
@@ -180,13 +179,13 @@ def other_period(data: bytes, config: RadarConfig) -> int | None:
     best = int(candidates[np.argmax(correlation[candidates])])
     if correlation[best] < 0.7 or correlation[loop] > 0.5 * correlation[best]:
         return None
-    # A multiple of the period is as good; what is much shorter than a loop is from receiver to receiver.
+    # A multiple of the period is equally good; a period much shorter than a loop is that between receivers.
     parts = [best // count for count in (4, 3, 2) if best % (2 * count) == 0 and best // count >= candidates[0]]
     return next((part for part in parts if correlation[part] > _AS_GOOD * correlation[best]), best)
 
 
 def configured(source: Path, given: Given) -> Given:
-    """The same with the ``.cfg`` of the source's name beside it, unless a configuration is given."""
+    """Return the settings with the ``.cfg`` beside the source, of the same name, unless a configuration is given."""
     beside = whole_name(source).with_suffix(".cfg")
     return given.or_else(*load_config(beside)) if given.config is None and beside.is_file() else given
 
@@ -198,7 +197,7 @@ def _open(source: Path, given: Given, _: Path) -> Capture:
 
 
 def of_studio(source: Path) -> bool:
-    """Whether the settings of mmWave Studio lie beside a ``.bin``, and no ``.cfg`` of its name."""
+    """Return whether the settings of mmWave Studio are beside a ``.bin``, and no ``.cfg`` of its name."""
     configured = whole_name(source).with_suffix(".cfg").is_file()
     return not configured and len(list(source.parent.glob("*.mmwave.json"))) == 1
 

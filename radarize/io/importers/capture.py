@@ -1,4 +1,4 @@
-"""What every foreign format is opened as."""
+"""An opened source of any other format."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -10,25 +10,25 @@ from jaxtyping import Bool, Float, Int16
 from radarize.io.recording import Product, Stream
 from radarize.radar.config import RadarConfig
 
-#: Bytes of samples handled at a time, whatever the length of the source.
+#: Bytes of samples processed at a time, for sources of any length.
 BATCH_BYTES = 16 << 20
 
 
 def batch_frames(config: RadarConfig, streams: Mapping[str, Stream] | None = None) -> int:
-    """Frames in a batch, with a row of each stream for each of them."""
+    """Return the number of frames of a batch, each with a row of every stream."""
     rows = sum(math.prod(stream.shape) * np.dtype(stream.dtype).itemsize for stream in (streams or {}).values())
     return max(1, BATCH_BYTES // (config.frame_bytes + rows))
 
 
 @dataclass
 class CapturedFrames:
-    """Frames that follow each other.
+    """Consecutive frames.
 
     Attributes:
-        frames: samples, I and Q in the order that the capture's configuration claims.
-        valid: per chirp, whether its samples are all there.
-        times: stamps, s; None where the source has none: then a frame period apart.
-        rows: of the capture's streams.
+        frames: samples, I and Q in the order of the capture's configuration.
+        valid: per chirp, whether all its samples are present.
+        times: stamps, s; None if the source has none: then one frame period apart.
+        rows: rows of the capture's streams.
     """
 
     frames: Int16[np.ndarray, "frame loop tx rx sample 2"]
@@ -39,17 +39,17 @@ class CapturedFrames:
 
 @dataclass
 class Capture:
-    """An opened source.
+    """An opened source of samples.
 
     Attributes:
-        cfg_text: text it was read from, if any.
-        batches: there is at least one, or taking the first raises InputError.
+        cfg_text: text of the configuration, if any.
+        batches: batches of frames; taking the first one raises InputError if there is none.
         expected_frames: estimate for progress bars.
-        assumed: settings that nobody gave.
+        assumed: names of assumed settings.
         warnings: what the user should know; complete once `batches` is exhausted.
-        attributes: facts to store with the recording.
-        board_known: it says which board made it.
-        streams, products: what came along with the samples, as `RecordingWriter` takes them.
+        attributes: attributes to store in the recording.
+        board_known: whether the source names the board.
+        streams, products: further data beside the samples, as for `RecordingWriter`.
     """
 
     config: RadarConfig

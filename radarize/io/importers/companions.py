@@ -1,6 +1,6 @@
-"""What comes along with raw frames in a ROS bag, brought to the frames: true poses, depth, IMU, point clouds.
+"""Further topics beside raw frames in a ROS bag, assigned to the frames: true poses, depth, IMU, point clouds.
 
-Names, units and conventions are those of the simulator's sensors, so that nothing downstream can tell them apart.
+Names, units and conventions are those of the simulator's sensors, so that later steps treat them equally.
 """
 
 import io
@@ -21,33 +21,33 @@ from radarize.radar.config import RadarConfig
 from radarize.signal.depthlabel import LABEL, label_streams, occupancy
 from radarize.signal.points import COLUMNS
 
-#: s: header stamps that are further from the time of receipt are not of the same clock.
+#: s, maximum difference of a header stamp from the time of receipt if both are on the same clock.
 SAME_CLOCK = 0.5
-#: s: between poses further apart nothing is known.
+#: s, longest gap between poses that is interpolated.
 _LARGEST_GAP = 0.25
-#: Bytes before the picture in a compressedDepth message: an enumeration and two float32 (image_transport_plugins).
+#: Bytes before the image in a compressedDepth message: an enumeration and two float32 (image_transport_plugins).
 _DEPTH_HEADER = 12
-#: More than any depth camera has: packed, they may come in few bytes.
+#: Maximum number of pixels, more than any depth camera has; a few compressed bytes may declare more.
 _MOST_PIXELS = 1 << 24
-#: fx fy cx cy of the Radarize data set's depth pictures, which come without a camera_info (pixels).
+#: fx fy cx cy (pixels) of depth images in the Radarize data set, which has no camera_info.
 STRIP = {(100, 848): (423.993, 423.993, 432.966, 50.938)}
 
 
 def header_time(message: Message) -> float:
-    """A message's own stamp, s; minus infinity where it has no header."""
+    """Return the stamp of a message's header, s; minus infinity without a header."""
     header = getattr(message, "header", None)
     return header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else -np.inf
 
 
 class Companion(ABC):
-    """A topic beside the radar's, taken message by message and given out frame batch by frame batch.
+    """Reader of a topic beside the radar's: takes message by message, returns rows for each batch of frames.
 
     Args:
-        first: the topic's first message.
+        first: first message of the topic.
 
     Attributes:
         streams, products: data sets of the recording by path.
-        damaged: messages that could not be used.
+        damaged: number of unusable messages.
     """
 
     streams: Mapping[str, Stream]
@@ -61,17 +61,17 @@ class Companion(ABC):
         self._waiting: deque[tuple] = deque()
 
     def take(self, message: Message, received: float) -> None:
-        """Keep a message until its frame comes.
+        """Store a message until its frame is processed.
 
         Args:
-            message: as the bag has it.
-            received: s; stands in for a header stamp that was not set.
+            message: message from the bag.
+            received: time of receipt, s; used if the header has no stamp.
         """
         stamp = header_time(message)
         if self._own_clock is None:
             self._own_clock = abs(stamp - received) < SAME_CLOCK
         time = stamp if self._own_clock else received
-        if time > self._last:  # what comes again or out of order adds nothing
+        if time > self._last:  # repeated messages and those out of order are ignored
             self._last = time
             try:
                 self._waiting.append((time, *self.read(message)))
@@ -80,24 +80,24 @@ class Companion(ABC):
 
     @abstractmethod
     def read(self, message: Message) -> tuple:
-        """What is kept of a message."""
+        """Return the content of a message that is stored."""
 
     @abstractmethod
     def rows(self, times: Float[np.ndarray, "frame"], first: int, end: float) -> dict[str, np.ndarray]:
-        """Rows of the streams for the next frames.
+        """Return rows of the streams for the next frames.
 
         Args:
-            times: stamps, s.
-            first: number of the first.
+            times: stamps of the frames, s.
+            first: number of the first frame.
             end: stamp of the frame after them, s.
         """
 
     def forget(self, before: float) -> None:
-        """There are no frames before that instant, s."""
+        """Drop messages before a time, s, since no frames are before it."""
         self._until(before)
 
     def _until(self, end: float) -> list[tuple]:
-        """What was kept from before `end`, which is then forgotten."""
+        """Return and remove the messages before `end`."""
         found = []
         while self._waiting and self._waiting[0][0] < end:
             found.append(self._waiting.popleft())
@@ -105,9 +105,9 @@ class Companion(ABC):
 
 
 class TrackedPose(Companion):
-    """Odometry of a tracking camera as truth: poses between messages, and velocities over a frame period.
+    """Odometry of a tracking camera as truth: interpolated poses, and velocities over a frame period.
 
-    Where there is no pose within a quarter of a second before and after, rows are not-a-number.
+    Rows are not-a-number if there is no pose within 0.25 s before and after.
     """
 
     streams = {
@@ -117,20 +117,20 @@ class TrackedPose(Companion):
     }
 
     def read(self, message: Message) -> tuple:
-        """Pose."""
+        """Return the pose."""
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         return (np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]),)
 
     def rows(self, times: Float[np.ndarray, "frame"], first: int, end: float) -> dict[str, np.ndarray]:
-        """Pose and velocity in the middle of bursts; the latter from half a frame before to half a frame after, or on
-        the side of the middle that is known.
+        """Return pose and velocity in the middle of the bursts; velocity is the difference over one frame period around
+        it, or over the known half of it.
         """
         half = self.config.frame_period / 2
         middle = times + self.config.burst_center
         known = [
             (time, pose)
             for time, pose in self._waiting
-            if np.isfinite(pose).all() and 0.5 < np.abs(pose[3:]).max() < 2  # no rotation else
+            if np.isfinite(pose).all() and 0.5 < np.abs(pose[3:]).max() < 2  # else not a rotation
         ]
         pose, before, after = (_interpolated(known, at) for at in (middle, middle - half, middle + half))
         velocity, span = np.full((len(times), 6), np.nan), np.zeros((len(times), 1))
@@ -149,7 +149,7 @@ class TrackedPose(Companion):
 
 
 def _interpolated(known: list[tuple[float, np.ndarray]], at: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 7"]:
-    """Poses between known ones: straight lines, and turns at constant speed."""
+    """Interpolate poses: linearly in position, and at constant angular speed."""
     result = np.full((len(at), 7), np.nan)
     if len(known) < 2:
         return result
@@ -164,9 +164,9 @@ def _interpolated(known: list[tuple[float, np.ndarray]], at: Float[np.ndarray, "
 
 
 class Depth(Companion):
-    """Depth pictures, the nearest to the middle of each burst; all 0 where none is nearer than half a frame.
+    """Depth images, the nearest to the middle of each burst; all 0 if none is within half a frame period.
 
-    Where the lens is known, the occupancy label of each picture comes with it.
+    If the lens is known, each image also has its occupancy label.
     """
 
     def __init__(self, config: RadarConfig, first: Message):
@@ -181,7 +181,7 @@ class Depth(Companion):
             self.calibrate(STRIP[self._shape])
 
     def calibrate(self, pinhole: tuple[float, float, float, float]) -> None:
-        """Set fx, fy, cx, cy (pixels)."""
+        """Set the pinhole model fx, fy, cx, cy (pixels)."""
         about = "fx fy cx cy of the depth camera"
         self._pinhole = np.asarray(pinhole, float)
         label, axes = label_streams(self.config)
@@ -189,11 +189,11 @@ class Depth(Companion):
         self.products = {"truth/depth_intrinsics": Product(self._pinhole, "pixels", about), **axes}
 
     def read(self, message: Message) -> tuple:
-        """The picture as it came: unpacked only if a frame wants it."""
+        """Return the message unchanged; only images of frames are unpacked."""
         return (message,)
 
     def rows(self, times: Float[np.ndarray, "frame"], first: int, end: float) -> dict[str, np.ndarray]:
-        """Pictures in mm."""
+        """Return depth images in mm."""
         pictures = np.zeros((len(times), *self._shape), np.uint16)
         taken = np.array([time for time, _ in self._waiting])
         for index, middle in enumerate(times + self.config.burst_center if len(taken) else ()):
@@ -213,7 +213,7 @@ class Depth(Companion):
 
 
 def depth_picture(message: Message) -> UInt16[np.ndarray, "row column"]:
-    """Depth in mm of an Image (``16UC1``, ``32FC1``) or a CompressedImage of image transport ``compressedDepth``.
+    """Return depth in mm of an Image (``16UC1``, ``32FC1``) or a CompressedImage of transport ``compressedDepth``.
 
     Raises:
         InputError: another encoding, or a damaged picture.
@@ -251,7 +251,8 @@ def _millimetres(metres: np.ndarray) -> UInt16[np.ndarray, "row column"]:
 class InertialSensor(Companion):
     """Specific force and angular velocity at the sensor's own rate.
 
-    Its axes are the radar's, unless its frame is named an optical one (z ahead, x right: REP 103), or `turn` is called.
+    Its axes are those of the radar, unless its frame is named optical (z forward, x right: REP 103) or `turn` is
+    called.
     """
 
     streams = {
@@ -267,25 +268,25 @@ class InertialSensor(Companion):
             self.turn(Rotation.from_quat(OPTICAL_TURN), f"its frame is {frame}")
 
     def turn(self, rotation: Rotation, why: str) -> None:
-        """Set how it stands on the radar."""
+        """Set the rotation of the IMU relative to the radar."""
         place = np.array([0.0, 0, 0, *rotation.as_quat()])
         about = f"x y z qx qy qz qw of the IMU in the radar's frame; {why}; its place is not known"
         self.products = {"imu/mount": Product(place, "m, quaternion", about)}
 
     def read(self, message: Message) -> tuple:
-        """Both vectors."""
+        """Return specific force and angular velocity."""
         force, turn = message.linear_acceleration, message.angular_velocity
         return (force.x, force.y, force.z, turn.x, turn.y, turn.z)
 
     def rows(self, times: Float[np.ndarray, "frame"], first: int, end: float) -> dict[str, np.ndarray]:
-        """Samples until the next frame."""
+        """Return samples until the next frame."""
         table = np.array(self._until(end), float).reshape(-1, 7)
         table = table[table[:, 0] >= times[0]] if first == 0 else table
         return {"imu/time": table[:, 0], "imu/accelerometer": table[:, 1:4], "imu/gyroscope": table[:, 4:]}
 
 
 class ChipPoints(Companion):
-    """The radar's own point clouds, each with the frame nearest in time.
+    """Point clouds of the radar's firmware, each assigned to the frame nearest in time.
 
     Raises:
         InputError: clouds without x, y and z as float32.
@@ -302,11 +303,11 @@ class ChipPoints(Companion):
         }
 
     def read(self, message: Message) -> tuple:
-        """Points."""
+        """Return the points."""
         return (cloud_columns(message),)
 
     def rows(self, times: Float[np.ndarray, "frame"], first: int, end: float) -> dict[str, np.ndarray]:
-        """Points of the frames, one after another."""
+        """Return the points of the frames, one frame after another."""
         clouds = self._until((times[-1] + end) / 2)
         nearest = [int(np.abs(times - time).argmin()) for time, _ in clouds]
         frames = [np.full(len(cloud), first + index) for index, (_, cloud) in zip(nearest, clouds, strict=True)]
@@ -317,9 +318,9 @@ class ChipPoints(Companion):
 
 
 def cloud_columns(message: Message) -> Float[np.ndarray, "point column"]:
-    """Points of a PointCloud2 as `radarize.signal.points.COLUMNS`; what it does not have is not-a-number.
+    """Return points of a PointCloud2 as `radarize.signal.points.COLUMNS`; missing columns are not-a-number.
 
-    The chip calls receding velocities positive, and what it calls intensity is the SNR in dB (ti_mmwave_rospkg).
+    The chip's velocities are positive when receding, and its intensity is the SNR in dB (ti_mmwave_rospkg).
 
     Raises:
         InputError: no x, y and z as float32, or fewer bytes than points.

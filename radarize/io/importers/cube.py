@@ -1,4 +1,4 @@
-"""Raw samples as an array with axes of any order: ``.npy``, ``.npz`` and ``.mat``."""
+"""Import of raw samples as an array with axes in any order: ``.npy``, ``.npz`` and ``.mat``."""
 
 import math
 import re
@@ -17,35 +17,35 @@ from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 from radarize.radar.config import RadarConfig
 
-#: A length of an axis.
+#: Text of an axis length.
 _LENGTH = re.compile(r"[0-9]{1,9}")
-#: Axes of a recording's samples; ``iq`` is missing where entries are complex.
+#: Axes of a recording's samples; complex entries have no axis ``iq``.
 STANDARD = ("frame", "loop", "tx", "rx", "sample", "iq")
-#: Names that axes may have besides, and what they are made of, the last one running fastest. `slot` is the transmitter
-#: in firing order, `tx` in physical order; `qi` has the imaginary part first.
+#: Further names of axes, and the axes that they combine, the last one varying fastest. `slot` is the transmitter in
+#: firing order, `tx` in physical order; `qi` has the imaginary part first.
 JOINED = {"chirp": ("loop", "slot"), "virtual": ("tx", "rx")}
-#: Names of the same axis in another order.
+#: Names of axes in another order, and of the same axes in standard order.
 _OTHER_ORDER = {"slot": "tx", "qi": "iq"}
-#: ADC counts that the largest value of samples without a unit becomes: 12 dB below full scale.
+#: ADC counts to which the maximum of samples without a unit is scaled: 12 dB below full scale.
 _PEAK = 8192
 
 
 @dataclass(frozen=True)
 class ArrayAxes:
-    """Where in an array what is found.
+    """Meaning of the axes of an array.
 
     Attributes:
-        names: of the array's axes in order; of `STANDARD`, `JOINED`, ``slot`` and ``qi``.
+        names: names of the array's axes in order, out of `STANDARD`, `JOINED`, ``slot`` and ``qi``.
     """
 
     names: tuple[str, ...]
 
     @classmethod
     def parse(cls, text: str, array: ArrayFile) -> "ArrayAxes":
-        """Axes from their names (``frame,loop,virtual,sample``), or lengths for `STANDARD` in order (``9,32,3,4,96``).
+        """Parse names of axes (``frame,loop,virtual,sample``), or lengths for `STANDARD` in order (``9,32,3,4,96``).
 
         Raises:
-            InputError: an unknown or doubtful name, or a number of axes that the array does not have.
+            InputError: an unknown or ambiguous name, or another number of axes than the array has.
         """
         words = [word.strip() for word in text.split(",")]
         if all(_LENGTH.fullmatch(word) for word in words) and len(words) in (5, 6):
@@ -64,24 +64,24 @@ class ArrayAxes:
 
     @classmethod
     def guess(cls, array: ArrayFile) -> "ArrayAxes":
-        """The axes of a recording, if there are as many.
+        """Return the axes of a recording, if the array has as many.
 
         Raises:
-            InputError: there are not.
+            InputError: the array has another number of axes.
         """
         expected = 5 if array.dtype.kind == "c" else 6
         if len(array.shape) != expected:
             raise InputError(
-                f"{array.name}: has shape {array.shape}, expected shape to say what its axes are, such as "
+                f"{array.name}: has shape {array.shape}, expected the option shape to name its axes, such as "
                 "frame,loop,virtual,sample"
             )
         return cls(STANDARD[:expected])
 
     def lengths(self, array: ArrayFile, given: dict[str, int | None]) -> dict[str, int]:
-        """Lengths of frame, loop, tx, rx and sample; `given` says how many antennas there are on joined axes.
+        """Return lengths of frame, loop, tx, rx and sample; `given` has the numbers of antennas on combined axes.
 
         Raises:
-            InputError: the lengths cannot be told, or the array does not hold I and Q.
+            InputError: the lengths are not determined, or the array does not have I and Q.
         """
         found = {_OTHER_ORDER.get(name, name): n for name, n in zip(self.names, array.shape, strict=True)}
         for name, (outer, inner) in JOINED.items():
@@ -92,7 +92,7 @@ class ArrayAxes:
             if known is None:
                 raise InputError(f"{array.name}: has {length} entries on axis {name}, expected {inner} to be given")
             count = given[known]
-            assert count is not None  # it is known
+            assert count is not None  # it is one of the known ones
             if length % count:
                 raise InputError(f"{array.name}: has {length} entries on axis {name}, expected a multiple of {count}")
             found[known], found[outer if known == inner else inner] = count, length // count
@@ -104,7 +104,7 @@ class ArrayAxes:
         return {name: found.get(name, 1) for name in STANDARD[:5]}
 
     def standard(self, block: np.ndarray, config: RadarConfig) -> Complex[np.ndarray, "frame loop tx rx sample"]:
-        """Entries of some frames as complex samples on the axes of a recording."""
+        """Return some frames as complex samples on the axes of a recording."""
         loops, tx, rx, samples, _ = config.frame_shape
         sizes = {"loop": loops, "slot": tx, "tx": tx, "rx": rx, "sample": samples, "iq": 2, "qi": 2}
         names = [part for name in self.names for part in JOINED.get(name, (name,))]
@@ -121,22 +121,22 @@ class ArrayAxes:
 
 
 def open_cube(path: Path, given: Given, folder: Path) -> Capture:
-    """Open an array of samples; ADC counts, or any unit, which is then scaled to counts.
+    """Open an array of samples: ADC counts, or any other unit, which is scaled to counts.
 
     Args:
         path: the file.
-        given: what is known of the radar, lengths of axes need not be; and which array, with which axes (by default
-            those of a recording).
-        folder: where a compressed array may be unpacked.
+        given: settings of the radar (lengths of axes may be missing), name of the array, and its axes (by default those
+            of a recording).
+        folder: folder for unpacking a compressed array.
 
     Raises:
         InputError: not such a file, or its shape does not fit the configuration.
     """
     array = open_array(path, given.variable, folder)
     axes = ArrayAxes.parse(given.shape, array) if given.shape else ArrayAxes.guess(array)
-    said = given.config.model_dump() | {"tx": given.config.tx} if given.config else {}
-    said |= {name: value for name, value in given.overrides.items() if value}
-    counts = {name: len(value) if isinstance(value, tuple) else value for name, value in said.items()}
+    known = given.config.model_dump() | {"tx": given.config.tx} if given.config else {}
+    known |= {name: value for name, value in given.overrides.items() if value}
+    counts = {name: len(value) if isinstance(value, tuple) else value for name, value in known.items()}
     lengths = axes.lengths(array, {"loop": counts.get("loops"), "tx": counts.get("tx"), "rx": counts.get("rx")})
     found = {"samples": lengths["sample"], "loops": lengths["loop"], "rx": lengths["rx"], "tx": lengths["tx"]}
     config, assumed = given.configure(str(path), found)
@@ -174,21 +174,21 @@ def _batches(array: ArrayFile, axes: ArrayAxes, capture: Capture) -> Iterator[Ca
         clipped += lost
         yield CapturedFrames(frames, frames.any(axis=(3, 4, 5)) & known.all(axis=(3, 4)))
     if clipped:
-        capture.warnings.append(f"{clipped} values lie outside of 16 bits and are cut")
+        capture.warnings.append(f"{clipped} values exceed 16 bits and are clipped")
 
 
 def _counts_per_unit(values: np.ndarray) -> float:
-    """1 for whole numbers; else what makes a quarter of full scale of the first frames' largest value."""
+    """Return 1 for integers; else the factor that scales the maximum of the first frames to a quarter of full scale."""
     if (values == np.rint(values)).all():
         return 1.0
     return float(_PEAK / np.abs(values).max())
 
 
 def _counts(values: np.ndarray, scale: float) -> tuple[Int16[np.ndarray, "frame loop tx rx sample 2"], int]:
-    """Samples as 16-bit counts, and how many did not fit."""
+    """Return samples as 16-bit counts, and the number of clipped ones."""
     counts = np.rint(values * scale)
     if counts.min(initial=0) >= 0 and counts.max(initial=0) > np.iinfo(np.int16).max:
-        # Signed words that were read as unsigned ones, as some capture programs do.
+        # Signed words that a capture program wrote as unsigned ones.
         counts = np.where(counts > np.iinfo(np.int16).max, counts - 2**16, counts)
     inside = np.clip(counts, -(2**15), 2**15 - 1)
     return inside.astype(np.int16), int(np.count_nonzero(inside != counts))

@@ -1,6 +1,6 @@
-"""UDP packets of a network capture, and the captures of a radar that they make.
+"""UDP packets of a network capture, split into captures of a radar.
 
-There is one for each board and port, and for each start of the radar, from which on the board counts from 1 again.
+There is one capture per board and port, and per start of the radar, at which the board counts packets from 1 again.
 """
 
 import struct
@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 from radarize.radar.dca1000 import DATA_PORT, HEADER, MAX_PAYLOAD
 
-#: Packets by which sequence numbers step back or on within a stream, where networks reorder and lose them; and packets
-#: in a row that make a new start believed.
+#: Sequence numbers by which packets may step back or forward within a stream, since networks reorder and lose packets;
+#: number of consecutive packets that confirm a new start.
 _BACK, _ON, _AGREEING = 64, 4096, 4
-_MORE_OR_OFFSET = 0x3FFF  # of the field of an IPv4 header that says that a packet is a fragment
+_MORE_OR_OFFSET = 0x3FFF  # field of an IPv4 header that marks fragments
 
 
 class Flow(NamedTuple):
-    """Where packets come from and go to: IPv4 addresses and UDP ports."""
+    """Source and destination of packets: IPv4 addresses and UDP ports."""
 
     source: bytes
     source_port: int
@@ -33,9 +33,9 @@ class Datagram(NamedTuple):
     """A UDP packet.
 
     Attributes:
-        time: of arrival, s since 1970.
-        payload: what was captured of it.
-        cut, fragment: why that is not all: by the capture program's snap length; by IP, on the way.
+        time: time of arrival, s since 1970.
+        payload: captured payload.
+        cut, fragment: why it is incomplete: cut by the snap length of the capture program; split by IP in transmission.
     """
 
     time: float
@@ -46,17 +46,17 @@ class Datagram(NamedTuple):
 
     @property
     def sound(self) -> bool:
-        """Whether it is as long as a DCA1000's data packet may be."""
+        """Whether the packet has a valid length for data of a DCA1000."""
         return HEADER.size < len(self.payload) <= HEADER.size + MAX_PAYLOAD
 
     @property
     def sequence(self) -> int:
-        """Of a DCA1000's data packet."""
+        """Sequence number of a DCA1000 data packet."""
         return HEADER.unpack_from(self.payload)[0]
 
 
 def datagram(time: float, data: bytes) -> Datagram | None:
-    """The UDP packet that an Ethernet frame of IPv4 carries; None if there is none, or nothing in it."""
+    """Return the UDP packet in an Ethernet frame of IPv4; None if there is none, or if it is empty."""
     start = 18 if data[12:14] == b"\x81\x00" else 14  # with or without a VLAN tag
     if len(data) < start + 28 or data[start - 2 : start] != b"\x08\x00":
         return None
@@ -76,12 +76,12 @@ def datagram(time: float, data: bytes) -> Datagram | None:
 
 @dataclass
 class Start:
-    """A capture of a radar among the packets.
+    """A capture of a radar in a packet stream.
 
     Attributes:
-        flow, number: of packets, and which start of it, from 0.
-        time: of the first packet, s since 1970.
-        packets, cut, fragments: in all; of these, not captured whole, see `Datagram`.
+        flow, number: addresses of its packets, and the number of the start, from 0.
+        time: time of the first packet, s since 1970.
+        packets, cut, fragments: number of packets, and of incomplete ones, see `Datagram`.
     """
 
     flow: Flow
@@ -97,20 +97,20 @@ class Start:
         return f"{self.flow}{again}, {self.packets} packets from {begun} UTC"
 
     def why_lost(self) -> list[str]:
-        """Why samples of packets that came are lost, and what helps."""
+        """Return why samples of received packets are lost, and the remedy."""
         found = (
-            (self.cut, "cut by the snap length of the program that captured them (tcpdump -s 0 keeps them whole)"),
+            (self.cut, "cut by the snap length of the capture program (tcpdump -s 0 keeps them whole)"),
             (
                 self.fragments,
-                "split into IP fragments, which are not put together (an MTU of 1500 bytes prevents that)",
+                "split into IP fragments, which are not reassembled (an MTU of 1500 bytes prevents that)",
             ),
         )
-        return [f"{count} of {self.packets} data packets were {words}" for count, words in found if count]
+        return [f"{count} of {self.packets} data packets were {reason}" for count, reason in found if count]
 
 
 class _Starts:
-    """Tells the starts of one flow apart. A packet far from the stream waits until some in a row agree with it, or the
-    stream goes on."""
+    """Separates the starts of one flow. A packet far from the stream waits until consecutive packets confirm a start,
+    or the stream continues."""
 
     def __init__(self):
         self.number = 0
@@ -118,7 +118,7 @@ class _Starts:
         self._waiting: list[Datagram] = []
 
     def take(self, packet: Datagram) -> Iterator[tuple[int, Datagram]]:
-        """Packets that are now known to belong to a start, with its number."""
+        """Yield packets whose start is known, with its number."""
         sequence, newest = packet.sequence, self._newest
         last = self._waiting[-1].sequence if self._waiting else None
         if newest is None or (
@@ -139,13 +139,13 @@ class _Starts:
             yield from self.rest()
 
     def rest(self) -> Iterator[tuple[int, Datagram]]:
-        """Those that still wait."""
+        """Yield the waiting packets."""
         waiting, self._waiting = self._waiting, []
         yield from ((self.number, packet) for packet in waiting)
 
 
 def by_start(packets: Iterable[Datagram]) -> Iterator[tuple[Flow, int, Datagram]]:
-    """Packets with the start that they belong to, in the order of each flow."""
+    """Yield packets with flow and number of the start that they belong to, in the order of each flow."""
     flows: dict[Flow, _Starts] = {}
     for packet in packets:
         of_flow = flows.setdefault(packet.flow, _Starts())
@@ -156,9 +156,10 @@ def by_start(packets: Iterable[Datagram]) -> Iterator[tuple[Flow, int, Datagram]
 
 
 def starts(packets: Iterable[Datagram]) -> list[Start]:
-    """All captures, by time: those to the DCA1000's port, and to others where bytes are counted as it does."""
+    """Return all captures by time: those to the DCA1000's port, and those to other ports with the DCA1000's byte
+    count."""
     found: dict[tuple[Flow, int], Start] = {}
-    counted: dict[Flow, int] = {}  # by how much the bytes of a flow's packets are counted rightly
+    counted: dict[Flow, int] = {}  # number of packets of a flow with a correct byte count, minus others
     last: dict[Flow, tuple[int, int]] = {}
     for flow, number, packet in by_start(packets):
         start = found.setdefault((flow, number), Start(flow, number, packet.time))

@@ -1,4 +1,4 @@
-"""What a format to read is."""
+"""Definition of a format that can be imported."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Format:
-    """A format to read: the value of an entry point of the group ``radarize.importers``.
+    """A format that can be imported: the value of an entry point of the group ``radarize.importers``.
 
     Attributes:
-        noun: what a source of it is called: "ROS bag".
-        expected: what a user may give: "a ROS bag (.bag, .mcap, .db3 or a folder)".
-        fits: whether a file or folder is of this format.
-        open: opens a source as a `Capture`, given what the user says of it and a folder for what must be unpacked. None
-            of a format without samples.
-        write: writes the recording of a format without samples (such as one of pictures): source, output, what the user
-            says, further data sets, progress. None of a format with samples.
-        options: fields of `Given` that belong to this format and some others only.
-        captures: what captures a source holds, in words, where it may hold several, of which `Given.capture` is one.
-        last: asked after all other formats, such as one of any folder.
+        noun: name of a source, such as "ROS bag".
+        expected: what the user may give, such as "a ROS bag (.bag, .mcap, .db3 or a folder)".
+        fits: whether a file or folder has this format.
+        open: opens a source as a `Capture`, from the user's settings and a folder for unpacking. None for a format
+            without samples.
+        write: writes the recording of a format without samples, such as images: source, output, user's settings,
+            further data sets, progress. None for a format with samples.
+        options: fields of `Given` that only this and some other formats have.
+        captures: returns descriptions of the captures in a source that may have several; `Given.capture` selects one.
+        last: tried after all other formats, such as one that accepts any folder.
     """
 
     noun: str

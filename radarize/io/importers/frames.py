@@ -1,12 +1,12 @@
-"""Raw frames of a ROS bag: when they begin, and what was wrong with them.
+"""Raw frames of a ROS bag: their start times, and damaged ones.
 
-They are stamped as their headers say. The Radarize data set's publisher leaves that unset: then with the time of
-receipt less a latency, by default the burst's length, since no frame is received before its last chirp. That is the
-least; a recorder that waits for a frame's last packet, which the DCA1000 fills with the next frame's beginning, has a
-frame period.
+Frames are stamped from their headers. The publisher of the Radarize data set leaves the header stamp unset: then the
+stamp is the time of receipt minus a latency, by default the duration of the burst, since no frame is received before
+its last chirp. This is the minimum; a recorder that waits for the last packet of a frame, which the DCA1000 fills with
+the beginning of the next frame, has a latency of one frame period.
 
-Receipts are late by what the computer did meanwhile; the radar's timer is periodic. So receipts are moved to a line
-below them.
+Times of receipt are delayed by the load of the computer, while the radar's timer is periodic. They are therefore
+projected to a line below them.
 """
 
 from collections import deque
@@ -20,25 +20,25 @@ from radarize.io.importers.companions import SAME_CLOCK, header_time
 from radarize.io.importers.rosbag import Message
 from radarize.radar.config import RadarConfig
 
-#: s that a computer may hold frames up, parts of a recording whose least late frames make the line, and share by which
-#: receipts may be apart otherwise than configured.
+#: s by which a computer may delay frames; number of parts of a recording whose least delayed frames determine the line;
+#: relative deviation of receipts from the configured frame period.
 _HELD_UP, _PARTS, _AGREE = 2.0, 32, 0.01
-#: Frame periods by which a header may be ahead of all before it, measured by its receipt; and how many before it count.
+#: Frame periods by which a header may be ahead of all earlier ones, relative to receipt; number of earlier ones used.
 _EARLY, _BEFORE = 1.5, 64
 
 
 class Stamps:
-    """When frames begin: from their headers, or from their receipt.
+    """Start times of frames, from their headers or from their receipt.
 
     Args:
         first: the first frame.
-        received: when each frame was, s.
-        latency: given by the user, s.
+        received: times of receipt of all frames, s.
+        latency: latency from the user, s.
 
     Attributes:
-        latency: from a frame's start to its receipt, s; None where headers say.
-        assumed: what nobody said.
-        distrusted: headers so far that are ahead of their time.
+        latency: time from a frame's start to its receipt, s; None if headers are used.
+        assumed: names of assumed settings.
+        distrusted: number of headers so far that are ahead of their receipt.
     """
 
     def __init__(self, config: RadarConfig, first: object, received: Float[np.ndarray, "frame"], latency: float | None):
@@ -46,19 +46,20 @@ class Stamps:
         self.assumed = ("latency",) if latency is None and not from_headers else ()
         self.latency = None if from_headers else config.burst_time if latency is None else latency
         self.distrusted, self._period, self._last = 0, config.frame_period, -np.inf
-        self._ahead: deque[float] = deque(maxlen=_BEFORE)  # s, of headers, of their receipt
+        self._ahead: deque[float] = deque(maxlen=_BEFORE)  # s, headers minus receipt
         self._received = np.unique(received)
         self._periodic = self._received if from_headers else periodic(self._received, config.frame_period)
 
     def __call__(self, message: Message, received: float) -> float:
-        """Of a frame, s."""
+        """Return the start time of a frame, s."""
         if self.latency is None:
             self._last = self._trusted(header_time(message), received)
             return self._last
         return float(self._periodic[np.searchsorted(self._received, received)]) - self.latency
 
     def _trusted(self, header: float, received: float) -> float:
-        """A header's stamp, or what its receipt says if it is ahead: no frame is received before it begins."""
+        """Return the header's stamp, or one by frame period if it is too early: no frame is received before its
+        start."""
         ahead = header - received
         if self._ahead and ahead > max(self._ahead) + _EARLY * self._period:
             self.distrusted += 1
@@ -69,8 +70,8 @@ class Stamps:
 
     @property
     def warnings(self) -> list[str]:
-        """What was wrong with headers, in a sentence."""
-        what = "frames have a header ahead of their receipt, and are stamped by the frame period instead"
+        """A sentence on implausible headers, if there are any."""
+        what = "frames have a header ahead of their receipt and are stamped by the frame period instead"
         return [f"{self.distrusted} {what}"] if self.distrusted else []
 
     def __str__(self) -> str:
@@ -84,11 +85,12 @@ class Stamps:
 
 
 def periodic(received: Float[np.ndarray, "frame"], period: float) -> Float[np.ndarray, "frame"]:
-    """Receipts, s and ascending, on the line through those that are least late, a whole number of frame periods apart;
-    as they are where no line is within half a period of half of them.
+    """Return receipts (s, ascending) projected to the line through the least delayed ones, an integer number of frame
+    periods apart; unchanged if half of them are farther than half a period from any line.
 
-    A frame that is held up is received with those behind it, which say when it could have been. The line's slope is the
-    period by the bag's clock; the configured `period` says which frames are missing, unless receipts contradict it.
+    A delayed frame is received together with the frames after it, which limit its delay. The slope of the line is the
+    period on the bag's clock; the configured `period` determines which frames are missing, unless receipts contradict
+    it.
     """
     if len(received) < 3:
         return received
@@ -103,13 +105,13 @@ def periodic(received: Float[np.ndarray, "frame"], period: float) -> Float[np.nd
         least_late = min(least_late + _AGREE * step, at - numbers[k] * step)
     late = since - numbers * np.polyfit(numbers, punctual, 1)[0]
     least = [part[late[part].argmin()] for part in np.array_split(count, min(_PARTS, len(count)))]
-    slope, start, *_ = theilslopes(since[least], numbers[least])  # whatever frames were numbered wrongly
+    slope, start, *_ = theilslopes(since[least], numbers[least])  # robust to wrongly numbered frames
     line = start + slope * numbers
     return received[0] + line if np.median(np.abs(line - since)) < step / 2 else received
 
 
 class BagFrames:
-    """Raw frames that wait for what comes along with them, and what was wrong with others."""
+    """Raw frames that wait for messages of other topics, and counts of unusable ones."""
 
     def __init__(self, config: RadarConfig):
         self.config, self.words = config, config.frame_bytes // 2
@@ -119,7 +121,7 @@ class BagFrames:
         self._odd = self._again = 0
 
     def add(self, time: float, message: Message) -> None:
-        """Keep a frame, unless it has another size or does not come after the last one."""
+        """Store a frame, unless its size is wrong or it does not follow the last one."""
         words = np.asarray(message.data)
         if words.dtype.itemsize == 1:
             words = words[: words.size // 2 * 2].view("<i2")
@@ -133,16 +135,16 @@ class BagFrames:
             self.raw.append(words.astype(np.int16, copy=False))
 
     def take(self, count: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """Stamps and words of the first frames, and the stamp of the frame after them, s."""
+        """Return and remove the first frames: stamps, words, and the stamp of the frame after them, s."""
         times, raw = np.array(self.times[:count]), np.concatenate(self.raw[:count])
         del self.times[:count], self.raw[:count]
         return times, raw, self.times[0] if self.times else self.last + self.config.frame_period
 
     @property
     def warnings(self) -> list[str]:
-        """What was wrong."""
+        """Sentences on frames that are left out."""
         counted = (
-            (self._odd, f"frames have not the {self.words} words of the configuration and are left out"),
-            (self._again, "frames came again or out of order and are left out"),
+            (self._odd, f"frames do not have the {self.words} words of the configuration and are left out"),
+            (self._again, "frames are repeated or out of order and are left out"),
         )
         return [f"{count} {what}" for count, what in counted if count]

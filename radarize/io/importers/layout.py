@@ -1,9 +1,9 @@
-"""How the words of a raw capture lie, where not as a DCA1000's two lanes write them (`radarize.radar.dca1000`).
+"""Order of the words in a raw capture that differs from the two lanes of a DCA1000 (`radarize.radar.dca1000`).
 
-``pairs``        a receiver after the other, two samples' I and then their Q: IWR16xx to 68xx
+``pairs``        one receiver after the other, I of two samples and then their Q: IWR16xx to 68xx
 ``interleaved``  sample by sample I of all receivers, then their Q: the four lanes of xWR12xx and xWR14xx (SWRA581)
-``real``         a receiver after the other, real samples alone: `samples` of them, of which half as many complex ones
-                 at half the rate are made
+``real``         one receiver after the other, `samples` real samples, which are converted to half as many complex ones
+                 at half the rate
 """
 
 import numpy as np
@@ -14,9 +14,9 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import decode, range_balance
 
 LAYOUTS = ("pairs", "interleaved", "real")
-#: dB of nearer over farther energy, from which on samples are read right, and by which another reading is better.
+#: dB of near over far energy from which on a layout is plausible, and by which another one must be better.
 _RIGHT, _BETTER = 10.0, 8.0
-#: Chirps of one transmitter that are asked.
+#: Number of chirps of one transmitter that are examined.
 _ASKED = 256
 
 Words = Int16[np.ndarray, "word"]
@@ -24,12 +24,12 @@ Frames = Int16[np.ndarray, "frame loop tx rx sample 2"]
 
 
 def recorded(config: RadarConfig, layout: str) -> RadarConfig:
-    """The configuration of what comes out of a capture.
+    """Return the configuration of the decoded samples.
 
     Raises:
-        InputError: real samples that are no multiple of four.
+        InputError: the number of real samples is no multiple of four.
     """
-    if layout != "real" or config.iq_order == "real":  # which counts the complex ones already
+    if layout != "real" or config.iq_order == "real":  # already counted in complex samples
         return config
     if config.samples % 4:
         raise InputError(f"samples is {config.samples}, expected a multiple of four real samples")
@@ -38,11 +38,11 @@ def recorded(config: RadarConfig, layout: str) -> RadarConfig:
 
 
 def arranged(words: Words, config: RadarConfig, layout: str) -> Frames:
-    """Frames of words that lie so.
+    """Decode the words of frames in a layout.
 
     Args:
-        words: of whole frames.
-        config: `recorded`.
+        words: words of complete frames.
+        config: configuration from `recorded`.
     """
     if layout != "interleaved":
         return decode(words, config)
@@ -53,14 +53,14 @@ def arranged(words: Words, config: RadarConfig, layout: str) -> Frames:
 
 
 def likely(words: Words, config: RadarConfig, layout: str) -> str:
-    """The layout that samples plainly have instead; `layout` where none is.
+    """Return the layout that the samples clearly have instead of `layout`, or `layout`.
 
-    Echoes are near, leakage nearest of all: read right, samples have far more energy at near range than far away. Read
-    wrong, receivers or I and Q take turns within a chirp, which spreads all of it over range.
+    Echoes are near, and leakage is nearest: decoded correctly, samples have far more energy at near than at far range.
+    Decoded wrongly, receivers or I and Q alternate within a chirp, which spreads the energy over range.
 
     Args:
-        words: the capture's first ones.
-        config: as the capture's settings say.
+        words: first words of the capture.
+        config: configuration from the capture's settings.
     """
     nearer = {name: _nearer(words, config, name) for name in LAYOUTS}
     best = max(nearer, key=nearer.__getitem__)
@@ -68,7 +68,7 @@ def likely(words: Words, config: RadarConfig, layout: str) -> str:
 
 
 def _nearer(words: Words, config: RadarConfig, layout: str) -> float:
-    """dB of energy at near range over that far away, whichever of I and Q is first; 0 where too few words are there."""
+    """Return near over far energy, dB, for either order of I and Q; 0 if there are too few words."""
     if layout == "real" and config.iq_order != "real" and config.samples % 4:
         return 0.0
     of_one = recorded(config, layout).model_copy(update={"loops": 1, "tx_order": (0,), "bpm": None})

@@ -1,4 +1,4 @@
-"""Settings given by hand, for captures that say too little of themselves."""
+"""Settings from the user, for captures that do not contain all of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,47 +9,47 @@ from radarize.io.errors import InputError
 from radarize.radar.boards import likely_board, load_board
 from radarize.radar.config import RadarConfig
 
-#: Without these nobody can tell the frames apart.
+#: Settings that are needed to separate the frames.
 REQUIRED = ("samples", "loops", "rx")
 
 _START_FREQUENCY = 77e9
-#: Stand-ins where neither a configuration nor the user says otherwise: a common IWR1843 profile. They do not change
-#: the samples, only the scales of range, velocity and time.
+#: Values assumed if neither a configuration nor the user gives them: a common IWR1843 profile. They do not change the
+#: samples, only the scales of range, velocity and time.
 ASSUMED: dict[str, object] = {
     "tx_order": (0,),
-    "iq_order": "qqii",  # unless the samples say otherwise
+    "iq_order": "qqii",  # unless the samples show another order
     "start_frequency": _START_FREQUENCY,
     "slope": 60e12,
     "sample_rate": 5e6,
     "idle_time": 10e-6,
     "adc_start_time": 6e-6,
 }
-#: s: the ramp goes on for a moment after the last sample; frames come ten a second, or with half their burst to spare.
+#: s, ramp time after the last sample; minimum frame period, or 1.5 bursts if longer.
 AFTER_ADC = 1e-6
 _FRAME_PERIOD = 0.1
 
 
 @dataclass(frozen=True)
 class Given:
-    """What the user says of a capture, where it does not say so itself, or wrongly.
+    """Settings of a capture from the user, which complete or replace those in the capture.
 
-    Attributes:
-        config: radar configuration; by default what lies beside the source.
-        cfg_text: text that `config` was read from, kept in the recording.
-        overrides: fields of `RadarConfig` that replace or stand in for the configuration's; ``rx`` and ``tx`` may be
-            counts; None counts as not given.
-        start_time: the first frame's stamp, s.
-        poses: TUM file of the sensor's true poses on the recording's clock.
-        shape: axes of an array: names in order, such as ``frame,loop,tx,rx,sample``, or five or six lengths.
-        variable: which array of an ``.npz`` or ``.mat``.
-        latency: from a frame's start to its receipt in a ROS bag, s; by default what the headers say, else the burst's
-            length.
-        imu_turn: roll, pitch, yaw of a ROS bag's IMU on the radar, degrees; by default what its frame's name says.
-        walk: number of a walk in a data set of pictures.
-        align: take, as truth of a walk's frame, the lidar's picture of the same instant, not of the same number.
-        encoding: of a .bin's words, ``signed`` or ``offset-binary``.
-        capture: which of several captures in a network capture, from 1.
-        layout: of a .bin's words, see `radarize.io.importers.layout`.
+    config: radar configuration; by default the one beside the source.
+    cfg_text: text of `config`, stored in the recording.
+    overrides: fields of `RadarConfig` that replace or complete the configuration's; ``rx`` and ``tx`` may be
+        counts; None means not given.
+    start_time: stamp of the first frame, s.
+    poses: TUM file of true poses of the sensor on the recording's clock.
+    shape: axes of an array: names in order, such as ``frame,loop,tx,rx,sample``, or five or six lengths.
+    variable: name of the array in an ``.npz`` or ``.mat``.
+    latency: time from a frame's start to its receipt in a ROS bag, s; by default from headers, else the burst
+        duration.
+    imu_turn: roll, pitch, yaw of a ROS bag's IMU relative to the radar, degrees; by default from the name of its
+        frame.
+    walk: number of a walk in a data set of images.
+    align: match frames of a walk with lidar images by time stamp instead of by frame index.
+    encoding: encoding of .bin words, ``signed`` or ``offset-binary``.
+    capture: number of one of several captures in a network capture, from 1.
+    layout: order of .bin words, see `radarize.io.importers.layout`.
     """
 
     config: RadarConfig | None = None
@@ -68,18 +68,18 @@ class Given:
     imu_turn: tuple[float, float, float] | None = None
 
     def or_else(self, config: RadarConfig, cfg_text: str) -> "Given":
-        """The same with a configuration, and its text, unless there is one."""
+        """Return the settings with a configuration and its text, unless they have one."""
         return self if self.config else replace(self, config=config, cfg_text=cfg_text)
 
     def configure(self, name: str, found: Mapping[str, object] | None = None) -> tuple[RadarConfig, tuple[str, ...]]:
-        """The configuration with the overrides, and the names of settings that had to be assumed.
+        """Return the configuration with the overrides, and the names of assumed settings.
 
         Args:
-            name: what errors call it.
-            found: what the source itself says where there is no configuration.
+            name: name of the capture in errors.
+            found: settings in the source itself, used without a configuration.
 
         Raises:
-            InputError: a value is impossible, or too few are known.
+            InputError: a value is impossible, or required ones are missing.
         """
         given: dict[str, Any] = {key: value for key, value in self.overrides.items() if value is not None}
         if self.config is None:
@@ -109,5 +109,5 @@ class Given:
             burst = fields["loops"] * len(fields["tx_order"]) * (fields["idle_time"] + fields["ramp_end_time"])
             fields.setdefault("frame_period", max(_FRAME_PERIOD, 1.5 * burst))
         except (TypeError, ZeroDivisionError, OverflowError):
-            pass  # the configuration's own checks name the field
+            pass  # the checks of `RadarConfig` name the field
         return RadarConfig.build(name, **fields), tuple(key for key in fields if key not in given and key != "board")

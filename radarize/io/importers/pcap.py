@@ -1,7 +1,7 @@
-"""Network captures of a DCA1000's UDP stream: ``.pcap``, and Wireshark's ``.pcapng``.
+"""Import of network captures of a DCA1000's UDP stream: ``.pcap``, and Wireshark's ``.pcapng``.
 
 Formats: https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html, and -pcapng-03.html beside it, by dpkt; link
-type 1 (Ethernet), IPv4, UDP to port 4098. Of a ``.pcapng``, the first interface says the link type and the clock.
+type 1 (Ethernet), IPv4, UDP to port 4098. In a ``.pcapng``, the first interface determines link type and clock.
 """
 
 import struct
@@ -32,7 +32,7 @@ MAGIC = {
 NEXT_GENERATION = b"\x0a\x0d\x0d\x0a"
 _ETHERNET = 1
 _LONGEST_RECORD = 1 << 18
-#: With so many times more bytes lost than the file has, the byte counts are damaged, not the network.
+#: Maximum ratio of lost bytes to the size of the file; above it the byte counts are damaged, not the network.
 _MOST_LOST = 20
 
 
@@ -41,10 +41,11 @@ def open_pcap(path: Path, given: Given) -> Capture:
 
     Args:
         path: the file.
-        given: what is known of the radar, and which of several captures is wanted.
+        given: settings of the radar, and the number of the capture if there are several.
 
     Raises:
-        InputError: no pcap or pcapng file of Ethernet packets; no whole packet; or (on reading) without a whole frame.
+        InputError: not a pcap or pcapng file of Ethernet packets; no complete packet; or (on reading) no complete
+            frame.
     """
     config, assumed = given.configure(str(path))
     expected = path.stat().st_size // config.frame_bytes
@@ -70,7 +71,7 @@ def _starts(path: Path) -> list[Start]:
 
 
 def captures(path: Path) -> list[str]:
-    """What captures a file holds: one for each board, port, and start of the radar."""
+    """Return descriptions of the captures in a file: one per board, port, and start of the radar."""
     return [str(each) for each in _starts(path)]
 
 
@@ -84,7 +85,7 @@ def _batches(path: Path, capture: Capture, start: Start | None) -> Iterator[Capt
         if assembler.counts.lost_bytes > most_lost:
             raise InputError(
                 f"{path}: lacks more than {most_lost} bytes between its data packets, {_MOST_LOST} times its size; "
-                "expected byte counts that grow as packets come"
+                "expected byte counts that increase with the packets"
             )
         if not yielded and not frames:
             capture.warnings += _misfit(frame[0], capture.config)
@@ -104,13 +105,14 @@ def _batches(path: Path, capture: Capture, start: Start | None) -> Iterator[Capt
 
 
 def _misfit(words: np.ndarray, config: RadarConfig) -> list[str]:
-    """A warning if a frame's samples plainly repeat otherwise than configured, as with too few transmitters."""
+    """Return a warning if a frame's samples clearly have another period than configured, as with missing
+    transmitters."""
     if (period := other_period(words.tobytes(), config)) is None:
         return []
     loop = config.frame_bytes // 4 // config.loops
     return [
         f"samples repeat every {period} and not every {loop} (TX x RX x samples), expected the configuration of this "
-        "capture: --tx says how many transmitters there are"
+        "capture: give the number of transmitters with --tx"
     ]
 
 
@@ -130,7 +132,7 @@ def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> 
 
 
 def _datagrams(path: Path, warnings: list[str]) -> Iterator[Datagram]:
-    """UDP packets; a warning where the file ends too early."""
+    """Yield UDP packets; add a warning if the file ends too early."""
     with path.open("rb") as file:
         packets = _packets(file, path)
         while True:
@@ -146,15 +148,15 @@ def _datagrams(path: Path, warnings: list[str]) -> Iterator[Datagram]:
 
 
 class _Broken(Exception):
-    """Why no packet can be read from here on."""
+    """No packet can be read from here on; the message is the reason."""
 
 
 def _packets(file: BinaryIO, path: Path) -> Iterator[tuple[float, bytes]]:
-    """Arrival time and Ethernet frame of each packet.
+    """Return arrival time and Ethernet frame of each packet.
 
     Raises:
-        InputError: no network capture, or not of Ethernet; at once, before the first packet is asked for.
-        _Broken: (on reading) what follows cannot be read.
+        InputError: not a network capture, or not of Ethernet; raised before the first packet is requested.
+        _Broken: (on reading) the rest cannot be read.
     """
     magic = file.read(4)
     file.seek(0)
@@ -196,7 +198,7 @@ def _next_generation(reader: dpkt.pcapng.Reader) -> Iterator[tuple[float, bytes]
 
 
 class _Bounded:
-    """A file of which nobody reads more at once than a packet may have: lengths come from the file itself."""
+    """File object that limits each read to the size of a packet, since lengths come from the file itself."""
 
     def __init__(self, file: BinaryIO):
         self._file = file

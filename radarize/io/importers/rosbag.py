@@ -1,7 +1,7 @@
 """ROS 1 and ROS 2 bags as streams of messages, through the `rosbags` library.
 
-The radar's frames are read by the definition that the bag itself carries; ours stands in where there is none, as in
-ROS 2 bags before Iron. All other messages are ROS's own.
+The radar's frames are decoded with the definition in the bag; if there is none, as in ROS 2 bags before Iron, with
+ours. All other messages are standard ROS types.
 """
 
 import heapq
@@ -24,9 +24,9 @@ from rosbags.typesys.store import Typestore
 
 from radarize.io.errors import explained
 
-#: What the Radarize data set's recorder publishes for every frame, as its package defines it; header stamps stay unset.
-#: Phase biases are pairs of real and imaginary parts, chirp_time is in us, chirp_slope in Hz/s, frame_time in ms,
-#: sample_rate in Hz, and the shape is chirps, receivers, samples.
+#: Message that the Radarize data set's recorder publishes per frame, as defined in its package; header stamps are
+#: unset. Phase biases are pairs of real and imaginary parts, chirp_time is in us, chirp_slope in Hz/s, frame_time in
+#: ms, sample_rate in Hz, and the shape is chirps, receivers, samples.
 FRAME_TYPE = "xwr_raw_ros/msg/RadarFrameFull"
 FRAME_DEFINITION = """std_msgs/Header header
 string platform
@@ -46,20 +46,20 @@ uint8[] tx
 uint32[] shape
 int16[] data
 """
-#: A message as `rosbags` makes it: its fields are those of a definition that is read from the bag.
+#: A message from `rosbags`; its fields are those of a definition in the bag.
 Message: TypeAlias = Any
 
 
 class StreamingReader(Reader1):
-    """A ROS 1 bag, chunk by chunk in the order of time: the library's own way keeps an entry for every message."""
+    """Reader of a ROS 1 bag, chunk by chunk in order of time; the library's reader keeps an entry for every message."""
 
     def read_index_data(self, pos: int, indexes: dict) -> None:
-        """Leave the index of messages alone."""
+        """Skip the index of messages."""
 
     def messages(
         self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
     ) -> Generator[tuple[Connection, int, bytes], None, None]:
-        """Connection, time of receipt (ns) and content of messages, by ascending time."""
+        """Yield connection, time of receipt (ns) and content of messages, by ascending time."""
         del start, stop  # bags are read whole
         wanted = {connection.id: connection for connection in connections or self.connections}
         infos = [info for info in self.chunk_infos if wanted.keys() & info.connection_counts.keys()]
@@ -87,7 +87,7 @@ class StreamingReader(Reader1):
                 yield header.get_time("time"), connection, data
 
     def count(self, connection: Connection) -> int:
-        """Messages on a connection."""
+        """Return the number of messages on a connection."""
         return sum(info.connection_counts.get(connection.id, 0) for info in self.chunk_infos)
 
 
@@ -95,10 +95,10 @@ class Bag:
     """A bag opened for reading; use as a context manager.
 
     Args:
-        path: a ROS 1 ``.bag``, a ROS 2 bag's folder, or its ``.mcap`` or ``.db3``.
+        path: a ROS 1 ``.bag``, the folder of a ROS 2 bag, or its ``.mcap`` or ``.db3``.
 
     Raises:
-        InputError: no bag, an unfinished or damaged one.
+        InputError: not a bag, or an unfinished or damaged one.
     """
 
     def __init__(self, path: Path):
@@ -123,7 +123,7 @@ class Bag:
         self._open.close()
 
     def _definitions(self) -> Typestore:
-        """Standard messages, and the radar's frames as the bag defines them."""
+        """Return definitions of standard messages, and of the radar's frames from the bag."""
         types = get_typestore(Stores.ROS1_NOETIC if self._ros1 else Stores.ROS2_HUMBLE)
         found = get_types_from_msg(FRAME_DEFINITION, FRAME_TYPE)
         for connection in self._reader.connections:
@@ -137,7 +137,7 @@ class Bag:
 
     @property
     def topics(self) -> dict[str, tuple[str, int]]:
-        """Type (``package/msg/Name``) and number of messages by topic."""
+        """Type (``package/msg/Name``) and number of messages, by topic."""
         return {
             connection.topic: (
                 connection.msgtype,
@@ -147,10 +147,10 @@ class Bag:
         }
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, Message]]:
-        """Topic, time of receipt (ns) and content of messages, by ascending time.
+        """Yield topic, time of receipt (ns) and content of messages, by ascending time.
 
         Raises:
-            InputError: the bag is damaged, or a message is not as its definition says.
+            InputError: the bag is damaged, or a message does not match its definition.
         """
         decode = self._types.deserialize_ros1 if self._ros1 else self._types.deserialize_cdr
         with explained(f"{self.path}: is no readable ROS bag"):
@@ -158,7 +158,7 @@ class Bag:
                 yield connection.topic, time, decode(data, connection.msgtype)
 
     def receipts(self, topic: str) -> Float[np.ndarray, "message"]:
-        """Times of receipt of a topic's messages, s; their content is not looked at.
+        """Return times of receipt of a topic's messages, s, without decoding them.
 
         Raises:
             InputError: the bag is damaged.
@@ -175,5 +175,5 @@ class Bag:
 
 
 def is_frame(kind: str) -> bool:
-    """Whether a message type is that of raw radar frames, of whatever package."""
+    """Return whether a message type is that of raw radar frames, of any package."""
     return bool(re.fullmatch(r"[A-Za-z]\w*/msg/RadarFrameFull", kind, re.ASCII))

@@ -1,6 +1,6 @@
-"""Sequences of the red-rover rig in its `roverd` layout, as the data set I/Q-1M has them (Huang et al., 2025).
+"""Import of sequences of the red-rover rig in its `roverd` layout, as in the data set I/Q-1M (Huang et al., 2025).
 
-SEQUENCE/config.yaml          how it was recorded; radar: args: radar: chirps, in GHz, MHz/us, us, ksps and ms
+SEQUENCE/config.yaml          configuration of the rig; radar: args: radar: chirps, in GHz, MHz/us, us, ksps and ms
          radar/meta.json      type and shape of each channel; iq: [loop, tx, rx, 2 x sample] of int16
          radar/radar.json     range and Doppler resolution, m and m/s; in our exports also the order of transmitters
          radar/iq, ts         words of the radar frame by frame; stamps, s
@@ -29,20 +29,20 @@ from radarize.io.yamlfile import read_yaml
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig, fired
 from radarize.radar.dca1000 import check_layout, decode
 
-#: Transmitters that fire, one after the other: with two, the raised one in the middle of the row is left out.
+#: Firing transmitters; with two, the elevated one in the middle of the row is left out.
 _TRANSMITTERS = {1: (0,), 2: (0, 2), 3: (0, 1, 2)}
-#: Fields of a configuration: their names in config.yaml, and units.
+#: Fields of a configuration: names in config.yaml, and units.
 _FIELDS = {
     "start_frequency": ("frequency", 1e9), "slope": ("freq_slope", 1e12), "sample_rate": ("sample_rate", 1e3),
     "idle_time": ("idle_time", 1e-6), "adc_start_time": ("adc_start_time", 1e-6),
     "ramp_end_time": ("ramp_end_time", 1e-6), "frame_period": ("frame_period", 1e-3),
 }  # fmt: skip
-#: Words in a row, from a multiple of as many on, that are zero where packets were lost and never else.
+#: Length of an aligned run of zero words that occurs only where packets were lost.
 _RUN = 16
 
 
 class _Channel(NamedTuple):
-    """A file of frames that follow each other."""
+    """A file with the data of consecutive frames."""
 
     path: Path
     dtype: np.dtype
@@ -50,7 +50,7 @@ class _Channel(NamedTuple):
 
     @property
     def frames(self) -> int:
-        """Whole ones: a recording may have ended within one."""
+        """Number of complete frames; a recording may end within one."""
         return regular(self.path, "a channel of a roverd sensor").stat().st_size // self.frame_bytes
 
     @property
@@ -58,7 +58,7 @@ class _Channel(NamedTuple):
         return math.prod(self.shape) * self.dtype.itemsize
 
     def read(self, start: int, stop: int) -> np.ndarray:
-        """Of some frames."""
+        """Read some frames."""
         with explained(f"{self.path}: cannot be read", OSError), self.path.open("rb") as file:
             file.seek(start * self.frame_bytes)
             data = file.read((stop - start) * self.frame_bytes)
@@ -66,15 +66,15 @@ class _Channel(NamedTuple):
 
 
 def is_sequence(source: Path) -> bool:
-    """Whether a folder is such a sequence."""
+    """Return whether a folder is a sequence in roverd's layout."""
     return (source / "radar" / "meta.json").is_file()
 
 
 def open_sequence(source: Path, given: Given) -> Capture:
-    """Open a sequence; chirps that lost packets have filled with zeros are not valid.
+    """Open a sequence; chirps with zeros from lost packets are marked as not valid.
 
     Raises:
-        InputError: no such layout, a channel of another type, or chirps that do not fit its shape.
+        InputError: not in this layout, a channel of another type, or chirps that do not fit its shape.
     """
     sensor = source / "radar"
     meta = parse_json(read_text(sensor / "meta.json", "JSON"), str(sensor / "meta.json"))
@@ -83,13 +83,13 @@ def open_sequence(source: Path, given: Given) -> Capture:
         raise InputError(f"{words.path}: has shape {words.shape}, expected loops, 1 to 3 tx, rx and twice the samples")
     loops, tx, rx, numbers = words.shape
     found: dict[str, Any] = {"loops": loops, "tx_order": _TRANSMITTERS[tx], "rx": rx, "samples": numbers // 2}
-    told = _intrinsics(sensor / "radar.json")
+    computed = _intrinsics(sensor / "radar.json")
     chirps = _chirps(source / "config.yaml") | found
-    said = {name: value for name, value in given.overrides.items() if value is not None}
-    config, assumed = given.configure(str(source), _resolved(chirps | said, told) | chirps)
-    fired = _fired(sensor / "radar.json", told, config)
-    if "tx_order" in told:
-        config = config.model_copy(update={"tx_order": config.tx})  # of our exports: words are in the order of antennas
+    overrides = {name: value for name, value in given.overrides.items() if value is not None}
+    config, assumed = given.configure(str(source), _resolved(chirps | overrides, computed) | chirps)
+    fired = _fired(sensor / "radar.json", computed, config)
+    if "tx_order" in computed:
+        config = config.model_copy(update={"tx_order": config.tx})  # in our exports words are in the order of antennas
     check_layout(config)
     if (config.loops, len(config.tx), len(config.rx), 2 * config.samples) != words.shape:
         raise InputError(f"{words.path}: has shape {words.shape}, expected that of the configuration's frames")
@@ -103,16 +103,16 @@ def open_sequence(source: Path, given: Given) -> Capture:
         whole = _channel(sensor, meta, "valid", "u1").read(0, count)
         doubtful[: len(whole)] = whole == 0
     capture = Capture(fired, "", (), count, assumed, products=_poses(source / "_radar" / "pose.npz"))
-    capture.warnings += _contradictions(sensor / "radar.json", told, config)
+    capture.warnings += _contradictions(sensor / "radar.json", computed, config)
     capture.batches = _batches(words, stamps, doubtful, config)
     return capture
 
 
 def _channel(sensor: Path, meta: dict, name: str, kind: str) -> _Channel:
-    """A channel of plain numbers.
+    """Return a channel of plain numbers.
 
     Raises:
-        InputError: there is none, or of another type.
+        InputError: there is none, or it has another type.
     """
     about = meta.get(name)
     shape = about.get("shape") if isinstance(about, dict) else None
@@ -125,16 +125,16 @@ def _channel(sensor: Path, meta: dict, name: str, kind: str) -> _Channel:
     with explained(f"{sensor / 'meta.json'}: {name}: type", TypeError, ValueError):
         dtype = np.dtype(str(about.get("type"))).newbyteorder("<")
     if about.get("format") != "raw" or dtype != np.dtype(kind):
-        told = f"{about.get('format')} {about.get('type')}"
-        raise InputError(f"{sensor / 'meta.json'}: {name} is {told[:40]}, expected raw {np.dtype(kind).name}")
+        found = f"{about.get('format')} {about.get('type')}"
+        raise InputError(f"{sensor / 'meta.json'}: {name} is {found[:40]}, expected raw {np.dtype(kind).name}")
     return _Channel(sensor / name, dtype, tuple(shape))
 
 
 def _chirps(path: Path) -> dict[str, object]:
-    """What the rig's configuration says of them; nothing where there is none.
+    """Return the chirp parameters in the rig's configuration; empty without a file.
 
     Raises:
-        InputError: it says no numbers.
+        InputError: a parameter is missing or not a number.
     """
     if not path.exists():
         return {}
@@ -152,10 +152,10 @@ def _chirps(path: Path) -> dict[str, object]:
 
 
 def _intrinsics(path: Path) -> dict[str, Any]:
-    """What the rig's program computed of its chirps; nothing where there is none.
+    """Return the resolutions that the rig's program computed from its chirps; empty without a file.
 
     Raises:
-        InputError: it is no JSON, or a resolution is no positive number.
+        InputError: the file is not JSON, or a resolution is not a positive number.
     """
     if not path.exists():
         return {}
@@ -167,18 +167,21 @@ def _intrinsics(path: Path) -> dict[str, Any]:
     return found
 
 
-def _resolved(chirps: dict[str, Any], told: dict[str, Any]) -> dict[str, Any]:
-    """Slope (Hz/s) and idle time (s) that give the resolutions, with what is assumed of the rest."""
+def _resolved(chirps: dict[str, Any], computed: dict[str, Any]) -> dict[str, Any]:
+    """Return slope (Hz/s) and idle time (s) that give the resolutions, given or assumed values for the other
+    parameters."""
     found: dict[str, Any] = {}
     fields: dict[str, Any] = ASSUMED | chirps
     window = fields["samples"] / fields["sample_rate"]
-    if "range_resolution" in told:
-        found["slope"] = SPEED_OF_LIGHT / (2 * told["range_resolution"] * window)
-    if "doppler_resolution" in told:
+    if "range_resolution" in computed:
+        found["slope"] = SPEED_OF_LIGHT / (2 * computed["range_resolution"] * window)
+    if "doppler_resolution" in computed:
         slope = fields["slope"] if "slope" in chirps else found.get("slope", fields["slope"])
         frequency = fields["start_frequency"] + slope * (fields["adc_start_time"] + window / 2)
         chirp = (
-            SPEED_OF_LIGHT / frequency / (2 * told["doppler_resolution"] * fields["loops"] * len(fields["tx_order"]))
+            SPEED_OF_LIGHT
+            / frequency
+            / (2 * computed["doppler_resolution"] * fields["loops"] * len(fields["tx_order"]))
         )
         ramp = fields.get("ramp_end_time", fields["adc_start_time"] + window + AFTER_ADC)
         if chirp > ramp:
@@ -186,13 +189,13 @@ def _resolved(chirps: dict[str, Any], told: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _fired(path: Path, told: dict[str, Any], config: RadarConfig) -> RadarConfig:
-    """The configuration with the order in which transmitters fired: words come in the order of antennas.
+def _fired(path: Path, computed: dict[str, Any], config: RadarConfig) -> RadarConfig:
+    """Return the configuration with the firing order of transmitters; words are in the order of antennas.
 
     Raises:
-        InputError: the order is not one of these transmitters.
+        InputError: the order does not contain exactly these transmitters.
     """
-    order = told.get("tx_order")
+    order = computed.get("tx_order")
     if order is None or len(config.tx_order) != len(set(config.tx)):
         return config
     names = [fired(tx)[0] + 1 for tx in config.tx]
@@ -201,21 +204,22 @@ def _fired(path: Path, told: dict[str, Any], config: RadarConfig) -> RadarConfig
     return config.changed(str(path), tx_order=tuple(int(tx) - 1 for tx in order))
 
 
-def _contradictions(path: Path, told: dict[str, Any], config: RadarConfig) -> list[str]:
-    """Where the configuration and what the rig's program computed of it differ by more than a hundredth."""
+def _contradictions(path: Path, computed: dict[str, Any], config: RadarConfig) -> list[str]:
+    """Return warnings where the configuration and the resolutions computed by the rig's program differ by more than 1
+    %."""
     own = {"range_resolution": config.range_resolution, "doppler_resolution": config.velocity_resolution}
     return [
-        f"{path}: {name} is {told[name]:.6g}, but the configuration has {value:.6g}"
+        f"{path}: {name} is {computed[name]:.6g}, but the configuration has {value:.6g}"
         for name, value in own.items()
-        if name in told and abs(told[name] / value - 1) > 0.01
+        if name in computed and abs(computed[name] / value - 1) > 0.01
     ]
 
 
 def _poses(path: Path) -> dict[str, Product]:
-    """True poses, if somebody has put any.
+    """Return the true poses in the sequence, if there are any.
 
     Raises:
-        InputError: no poses, or other numbers of them.
+        InputError: poses are missing, or their arrays differ in length.
     """
     if not path.exists():
         return {}
@@ -250,7 +254,7 @@ def _batches(
 
 
 def _filled(words: Int16[np.ndarray, "frame loop tx rx word"]) -> Bool[np.ndarray, "frame loop tx"]:
-    """Chirps with a run of zeros."""
+    """Return whether each chirp has a run of zeros."""
     chirps = words.reshape(*words.shape[:3], -1)
     runs = chirps[..., : chirps.shape[3] // _RUN * _RUN].reshape(*words.shape[:3], -1, _RUN)
     return np.any(~np.any(runs, axis=4), axis=3)

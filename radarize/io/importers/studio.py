@@ -1,4 +1,4 @@
-"""Captures of mmWave Studio: ``.bin`` with ``NAME.mmwave.json`` and ``NAME.setup.json`` beside it."""
+"""Import of mmWave Studio captures: ``.bin`` with ``NAME.mmwave.json`` and ``NAME.setup.json`` beside it."""
 
 from collections.abc import Sequence
 from pathlib import Path, PureWindowsPath
@@ -14,7 +14,7 @@ from radarize.radar.studio import load_json, load_studio
 
 
 def open_studio(source: Path, given: Given) -> Capture:
-    """Open a capture by its folder, or by one of its ``.bin`` files.
+    """Open a capture from its folder, or from one of its ``.bin`` files.
 
     Raises:
         InputError: settings or samples are missing or ambiguous; see `open_bin`.
@@ -42,7 +42,7 @@ def open_studio(source: Path, given: Given) -> Capture:
 
 
 def _captured(setup: dict, folder: Path) -> tuple[list[Path], int]:
-    """The sample files that the setup names and that are there, and the bytes that were zero-filled in them."""
+    """Return the existing sample files that the setup names, and the number of zero-filled bytes in them."""
     captured = setup.get("capturedFiles")
     entries = captured.get("files") if isinstance(captured, dict) else None
     files, filled = [], 0

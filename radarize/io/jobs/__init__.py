@@ -1,11 +1,12 @@
-"""Work that takes long, done beside each other: by processes of this machine, or on a Ray cluster, by the same call.
+"""Parallel jobs, in processes of this machine or on a Ray cluster, with the same call.
 
     for news in perform({"one": job, "other": another}, workers=4):     # or ray="auto"
         ...
 
-A job is a callable that can be pickled. It takes what it tells its progress to, and returns its result; a job that
-fails ends with a sentence and stops no other. A worker that dies is replaced and its job begun again, so a job leaves
-nothing half-done that it could not begin anew. Leaving the loop, by Ctrl-C for one, ends all workers, and nothing else.
+A job is a callable that can be pickled. It gets a function to report its progress, and returns its result; a job that
+fails ends with an error sentence and does not stop the others. A worker that dies is replaced and its job started
+again, so a job must not leave partial results that prevent a restart. Leaving the loop, for example by Ctrl-C, ends all
+workers.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,17 +22,17 @@ def perform(
     ray: str | None = None,
     alone: bool = False,
 ) -> Iterator[News]:
-    """Do jobs, in any order.
+    """Run jobs in parallel, in any order.
 
     Args:
-        jobs: by name, which sentences on them begin with.
-        workers: local processes, each with its share of the cores; one per core if None.
-        ray: address of a Ray cluster (``auto``: the one of this machine) to use instead, one core a job. Files that
-            jobs read and write must lie under the same path on every node.
-        alone: each job has all cores of a machine for itself.
+        jobs: jobs by name; error sentences begin with the name.
+        workers: number of local processes, which share the cores; one per core if None.
+        ray: address of a Ray cluster (``auto``: that of this machine) to use instead, with one core per job. Files that
+            jobs read and write must have the same path on every node.
+        alone: each job gets all cores of a machine.
 
     Yields:
-        how far jobs are, and how each ended.
+        progress and end of jobs, see `News`.
 
     Raises:
         InputError: Ray is not installed, or no cluster answers.

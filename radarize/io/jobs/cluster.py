@@ -1,4 +1,4 @@
-"""Jobs on a Ray cluster: one Ray task a job, begun again by Ray where a worker or a node is lost."""
+"""Jobs on a Ray cluster, one Ray task per job; Ray restarts a task whose worker or node is lost."""
 
 import logging
 import os
@@ -12,13 +12,13 @@ from typing import Any
 from radarize.io.errors import InputError, explained, first_line
 from radarize.io.jobs.job import Job, News, Report, attempt
 
-#: How often Ray begins a job again whose worker or node died.
+#: Number of times that Ray restarts a job whose worker or node died.
 RETRIES = 3
-_POLL = 0.5  # s between looks at the progress
+_POLL = 0.5  # s between queries of the progress
 
 
 class _Board:
-    """How far jobs are, kept where all workers reach it."""
+    """Progress of all jobs, in a Ray actor that all workers reach."""
 
     def __init__(self):
         self.done: dict[str, float] = {}
@@ -32,7 +32,7 @@ class _Board:
 
 @dataclass(frozen=True)
 class _Order:
-    """A job as a node gets it: with the folder that paths are relative to, and threads."""
+    """A job as sent to a node, with the working folder and the number of threads."""
 
     name: str
     job: Job
@@ -55,7 +55,7 @@ def _do(order: _Order, board: Any) -> News:  # what Ray makes of a `_Board`
 
 
 def perform(jobs: Mapping[str, Job], address: str, alone: bool) -> Iterator[News]:
-    """Do jobs on the cluster of that address, with one core each, or with all that the largest node has."""
+    """Run jobs on the cluster at an address, with one core each, or with all cores of the largest node."""
     ray = _connect(address)
     share = _largest_node(ray) if alone else {"num_cpus": 1}
     board = ray.remote(num_cpus=0)(_Board).remote()
@@ -82,7 +82,7 @@ def perform(jobs: Mapping[str, Job], address: str, alone: bool) -> Iterator[News
 
 
 def _largest_node(ray: ModuleType) -> dict[str, float]:
-    """Cores and GPUs of the node that has most."""
+    """Return cores and GPUs of the node with the most."""
     nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
     gpus, cpus = max((node.get("GPU", 0), node.get("CPU", 1)) for node in nodes)
     return {"num_cpus": cpus, "num_gpus": gpus}
@@ -99,7 +99,7 @@ def _connect(address: str) -> ModuleType:
 
 
 def _knock(address: str) -> None:
-    """Ray waits for minutes for an address where nobody is, and then ends the process."""
+    """Refuse an address at which no cluster answers; Ray itself would wait for minutes and then end the process."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host:
         return  # auto

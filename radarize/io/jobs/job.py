@@ -1,4 +1,4 @@
-"""A job, what one hears of it, and how it is tried."""
+"""Types of parallel jobs, and running a single one."""
 
 import os
 import traceback
@@ -7,22 +7,22 @@ from dataclasses import dataclass
 
 from radarize.io.errors import DEBUG, DiskFull, InputError, disk_full, first_line, of_system
 
-#: Takes how far a job is, in units of its own.
+#: Reports the progress of a job, in units of its own.
 Report = Callable[[float], None]
 Job = Callable[[Report], object]
 
 
 @dataclass(frozen=True)
 class News:
-    """What is heard of a job.
+    """A report on a job.
 
     Attributes:
-        name: of the job.
-        done: what it reported last.
-        ended: no more is heard of it.
-        result: of a job that ended well.
-        error: why it failed, one sentence.
-        full: whether it failed for want of space on the disk.
+        name: name of the job.
+        done: latest progress.
+        ended: whether the job has ended; the last report has True.
+        result: return value of a successful job.
+        error: reason of a failure, one sentence.
+        full: whether it failed because the disk is full.
     """
 
     name: str
@@ -34,12 +34,12 @@ class News:
 
     @property
     def failure(self) -> InputError:
-        """Why it failed, to raise."""
+        """The failure as an exception, to raise."""
         return (DiskFull if self.full else InputError)(self.error)
 
 
 def attempt(name: str, job: Job, report: Report) -> News:
-    """Do a job here; a failure is news, too: an internal error, whose place --debug shows, if nobody expects it."""
+    """Run a job in this process; a failure is returned, unexpected ones as internal errors (traceback with --debug)."""
     try:
         return News(name, ended=True, result=job(report))
     except InputError as error:

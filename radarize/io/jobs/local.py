@@ -1,4 +1,4 @@
-"""Jobs on this machine: worker processes that live through many jobs, each with its share of the cores."""
+"""Jobs on this machine: worker processes that run one job after another and share the cores."""
 
 import multiprocessing
 import os
@@ -13,13 +13,13 @@ from multiprocessing.connection import Connection, wait
 
 from radarize.io.jobs.job import Job, News, attempt
 
-#: How often a job is begun that its worker does not survive.
+#: Number of times that a job is started whose worker dies.
 ATTEMPTS = 2
 _SPAWN = multiprocessing.get_context("spawn")
 
 
 class _Worker:
-    """A process and the name of the job that it has."""
+    """A worker process and the name of its current job."""
 
     def __init__(self, threads: int):
         self.connection, theirs = _SPAWN.Pipe()
@@ -30,11 +30,11 @@ class _Worker:
 
     def give(self, name: str, job: Job) -> None:
         self.busy = name
-        with suppress(OSError):  # it has died at rest, which is heard of as any death
+        with suppress(OSError):  # it died while idle, which `hear` detects
             self.connection.send((name, job))
 
     def hear(self) -> News | None:
-        """News; None if it is dead."""
+        """Return the next report; None if the process died."""
         try:
             news = self.connection.recv()
         except (EOFError, OSError):
@@ -50,7 +50,7 @@ class _Worker:
 
 
 def perform(jobs: Mapping[str, Job], workers: int | None) -> Iterator[News]:
-    """Do jobs by so many processes at most, by default one per core."""
+    """Run jobs with at most this number of processes, by default one per core."""
     cores = len(os.sched_getaffinity(0))
     count = min(workers or cores, len(jobs))
     threads = max(1, cores // count)
@@ -84,15 +84,15 @@ def perform(jobs: Mapping[str, Job], workers: int | None) -> Iterator[News]:
 
 def _end(code: int | None) -> str:
     if code == -signal.SIGKILL:
-        return "was killed, twice; most often memory is short, and fewer --workers need less"
+        return "was killed twice; usually memory is short: use fewer --workers"
     return f"ended with code {code}, twice"
 
 
 def _serve(connection: Connection, threads: int) -> None:
-    """A worker's life."""
+    """Run jobs in a worker process until the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; the parent ends its workers
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    from radarize.io.jobs.threads import use_threads  # what it loads, only workers need
+    from radarize.io.jobs.threads import use_threads  # only workers need these libraries
 
     use_threads(threads)
     while True:
@@ -100,7 +100,7 @@ def _serve(connection: Connection, threads: int) -> None:
             name, job = connection.recv()
         except EOFError:
             return
-        use_threads(threads)  # of what came along with the job
+        use_threads(threads)  # for libraries imported with the job
         connection.send(attempt(name, job, partial(_report, connection, name)))
 
 
@@ -109,7 +109,7 @@ def _report(connection: Connection, name: str, done: float) -> None:
 
 
 def _end_with_parent() -> None:
-    """A parent that was killed cannot end its workers, which would go on writing."""
+    """End the worker when its parent was killed; otherwise it would continue to write."""
     parent = multiprocessing.parent_process()
     assert parent is not None  # only workers run this
     parent.join()

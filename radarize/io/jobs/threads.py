@@ -1,4 +1,4 @@
-"""A process's share of the cores."""
+"""Number of threads of a process."""
 
 import os
 import sys
@@ -6,14 +6,14 @@ import sys
 import numba
 from threadpoolctl import threadpool_limits
 
-#: What libraries that are yet to be loaded read. Numba's own is not among them: it complains if that changes.
+#: Variables read by libraries that are not imported yet. Numba's own is left out, since numba warns if it changes.
 _VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def use_threads(count: int) -> None:
-    """Let numba, torch and BLAS use so many threads in this process, whether they are loaded or not.
+    """Limit numba, torch and BLAS to this number of threads in this process, whether imported or not.
 
-    Each is told by its own call: once a library is there, environment variables come too late.
+    Each library is limited by its own function, since environment variables have no effect after import.
     """
     most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # numba sets it while it is imported
     numba.set_num_threads(min(count, most))

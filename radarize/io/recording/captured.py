@@ -1,24 +1,23 @@
-"""What came from a radar cannot be made again: it is never replaced unasked, and whatever ends a capture keeps it."""
+"""Protection of recordings of a real radar, which cannot be repeated, against being replaced."""
 
 from pathlib import Path
 
 from radarize.io.errors import InputError
 from radarize.io.recording.reader import Recording
 
-#: How the attribute ``source`` of such recordings begins.
+#: Start of the attribute ``source`` of recordings of a radar.
 FROM_RADAR = "radar at "
 
 
 def spare(output: Path, anything: bool = False) -> None:
-    """Refuse to replace a recording of a radar, finished or left behind in a ``.part``.
+    """Refuse to replace a recording of a radar, complete or interrupted (``.part``).
 
     Args:
-        output: that is to be written.
-        anything: refuse also what may be one, as far as anybody can tell: all but recordings that were simulated or
-            imported.
+        output: recording to be written.
+        anything: refuse also files that may be one, i.e. all but simulated or imported recordings.
 
     Raises:
-        InputError: it would be replaced.
+        InputError: the output is such a recording.
     """
     part = output.with_name(output.name + ".part")
     for path in (output, part):
@@ -33,6 +32,6 @@ def spare(output: Path, anything: bool = False) -> None:
         if real:
             rescue = f" (radarize recover {path} makes a recording of it)" if path == part else ""
             raise InputError(
-                f"{path}: is there already, and what came from a radar cannot be made again{rescue}, expected another "
+                f"{path}: already exists, and a recording of a radar cannot be repeated{rescue}, expected another "
                 "name, or --overwrite of `capture` and `live`"
             )

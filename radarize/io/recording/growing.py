@@ -1,7 +1,7 @@
-"""Recordings that a writer has open, or died with open: seen as they are now, without HDF5's multiple-reader mode.
+"""Reading recordings that a writer has open, or that were interrupted, without HDF5's multiple-reader mode.
 
-HDF5 refuses such files in any other mode; in that one it tries again without end, with pauses that double, whatever is
-damaged. So they are read past its back: with a superblock that says closed, as `h5clear` would leave it.
+HDF5 opens such files in that mode only, in which it retries forever, with doubling pauses, if anything is damaged. So
+HDF5 gets a superblock that is marked as closed, as `h5clear` would write it.
 """
 
 import io
@@ -13,18 +13,18 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Superblock of version 3 (HDF5 file format specification, II.A): after signature, version and two sizes, flags at byte
 #: 11; the base address, the extension's, the end of the file, the root's from byte 12 on; a checksum of all that.
 _FLAGS, _END, _CHECKED, _SIZE = 11, slice(28, 36), slice(0, 44), 48
-#: In use by a writer, and by one that permits readers.
+#: Flags: open by a writer, and by one that permits readers.
 _OPEN = 0b101
-#: Where the file is said to end, bytes: it may grow while it is read. HDF5 looks at so many bytes before it knows how
-#: long its smaller structures are, and so may look past the real end.
+#: Bytes; end of the file given to HDF5, since the file may grow while it is read. HDF5 reads this many bytes before it
+#: has the length of its smaller structures, and so may read past the real end.
 _FAR, _GLIMPSE = 1 << 50, 4096
 
 
 class GrowingFile(io.FileIO):
-    """A recording with frames still to come, for `h5py.File`.
+    """File object for `h5py.File` of a recording that may grow.
 
     Raises:
-        OSError: it is shorter than its writer left it, or its superblock is damaged.
+        OSError: it is shorter than its superblock states, or the superblock is damaged.
     """
 
     def __init__(self, path: Path):
@@ -40,20 +40,20 @@ class GrowingFile(io.FileIO):
         head[_END] = _FAR.to_bytes(8, "little")
         self._head = bytes(head[_CHECKED]) + struct.pack("<I", lookup3(head[_CHECKED]))
 
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go to a place; the end is far, further than the file system goes."""
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: _FAR}[whence]
+    def seek(self, offset: int, origin: int = io.SEEK_SET, /) -> int:
+        """Set the position; the end of the file is beyond any file system's limit."""
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: _FAR}[origin]
         return self._at
 
     def tell(self) -> int:
-        """Where the next bytes come from."""
+        """Return the position of the next bytes."""
         return self._at
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # h5py hands in nothing else
-        """Bytes from where the file stands; zeros past its end.
+        """Read bytes at the position; zeros past the end.
 
         Raises:
-            OSError: more than a glimpse past the end.
+            OSError: more than `_GLIMPSE` bytes past the end.
         """
         start, wanted = self._at, len(buffer)
         count = os.preadv(self.fileno(), [buffer], start)
@@ -68,14 +68,14 @@ class GrowingFile(io.FileIO):
 
 
 def is_growing(path: Path) -> bool:
-    """Whether a writer has the file open, or died with it open."""
+    """Return whether a writer has the file open, or died with it open."""
     with path.open("rb") as file:
         head = file.read(_SIZE)
     return len(head) == _SIZE and head[:8] == _SIGNATURE and head[8] == 3 and bool(head[_FLAGS] & _OPEN)
 
 
 def lookup3(data: bytes | bytearray) -> int:
-    """HDF5's checksum of metadata: Bob Jenkins's lookup3 (burtleburtle.net/bob/c/lookup3.c), 32 bits."""
+    """Return HDF5's checksum of metadata: Bob Jenkins's lookup3 (burtleburtle.net/bob/c/lookup3.c), 32 bits."""
 
     def turned(value: int, bits: int) -> int:
         return (value << bits | value >> 32 - bits) & 0xFFFFFFFF

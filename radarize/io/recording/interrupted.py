@@ -1,4 +1,4 @@
-"""What an interrupt leaves behind of a recording."""
+"""Message about the frames that are kept when a recording is interrupted."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from radarize.io.recording.reader import Recording
 
 @contextmanager
 def keeping(output: Path) -> Iterator[None]:
-    """Turn an interrupt into a sentence that says what of `output`, a recording, was kept.
+    """Turn an interrupt into a sentence on the frames that are kept in `output`, a recording.
 
     Raises:
         InputError: the user interrupted.
@@ -33,5 +33,5 @@ def _kept(output: Path, before: int | None) -> str:
                 with Recording(path) as recording:
                     return f"{len(recording)} whole frames are kept in {path}"
             except InputError:
-                pass  # not even its first frame was written
+                pass  # it has no frame
     return "nothing was written"

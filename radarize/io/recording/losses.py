@@ -1,4 +1,4 @@
-"""How much of a recording never arrived."""
+"""Statistics of frames and chirps that were lost."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -7,15 +7,15 @@ from radarize.radar.numbering import Numbering
 
 
 class Losses:
-    """Counts of chirps and frames with lost samples, and of frames that never came.
+    """Counts chirps and frames with lost samples, and missing frames.
 
     Args:
-        period: between frames, s.
+        period: frame period, s.
 
     Attributes:
-        frames, chirps: seen in all.
-        lost_chirps: with lost samples.
-        hit_frames, lost_frames: frames with such chirps, and with nothing else.
+        frames, chirps: total numbers.
+        lost_chirps: number of chirps with lost samples.
+        hit_frames, lost_frames: number of frames with some such chirps, and with only such chirps.
     """
 
     def __init__(self, period: float):
@@ -23,7 +23,7 @@ class Losses:
         self._numbering = Numbering(period)
 
     def add(self, valid: Bool[np.ndarray, "frame loop tx"], stamps: Float[np.ndarray, "frame"]) -> None:
-        """Count more frames."""
+        """Add frames to the counts."""
         self._numbering.of(stamps)
         whole = valid.reshape(len(valid), int(np.prod(valid.shape[1:])))
         self.frames += len(valid)
@@ -33,13 +33,13 @@ class Losses:
         self.lost_frames += int((~whole.any(axis=1)).sum())
 
     def warnings(self) -> list[str]:
-        """A sentence on missing frames, and one on lost samples, where there are any."""
+        """Return a sentence on missing frames, and one on lost samples, if there are any."""
         missing, share = self._numbering.missing, self.lost_chirps / max(self.chirps, 1)
-        told = [f"{missing} frames are missing between others"] if missing else []
+        warnings = [f"{missing} frames are missing between others"] if missing else []
         if self.lost_chirps:
-            told.append(
+            warnings.append(
                 f"{self.lost_chirps} of {self.chirps} chirps ({share:.2%}) in {self.hit_frames} of {self.frames} "
                 f"frames lost samples, {self.lost_frames} frames all of them; these are zero and the chirps marked in "
                 "/radar/valid"
             )
-        return told
+        return warnings

@@ -1,4 +1,4 @@
-"""Reading a recording, finished, growing, or left behind by a crash."""
+"""Reader of recordings: complete, growing, or interrupted."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ from radarize.io.trajectory import Trajectory
 from radarize.radar.boards import Board
 from radarize.radar.config import RadarConfig
 
-#: Environment variable by which `radarize train --board` hands a board's file to all that read recordings.
+#: Environment variable with which `radarize train --board` sets the board file for all processes that read recordings.
 BOARD = "RADARIZE_BOARD"
 
 
@@ -28,17 +28,17 @@ BOARD = "RADARIZE_BOARD"
 class Recording:
     """A recording opened for reading; use as a context manager, or keep it open.
 
-    ``recording[100]`` and ``recording[100:110]`` are frames, see `Clip`; ``len(recording)`` is how many there are.
-    Damaged frames cost themselves alone: what cannot be unpacked is lost (zero, and not valid), and a damaged stamp is
-    made anew from its neighbours, or its frame left out; `damage` says so.
+    ``recording[100]`` and ``recording[100:110]`` are frames, see `Clip`; ``len(recording)`` is their number. Damage is
+    limited to the affected frames: a frame that cannot be unpacked counts as lost (zero, and not valid), and a damaged
+    stamp is interpolated from its neighbours, or its frame is left out; `damage` lists this.
 
     Args:
-        path: an ``.h5`` file, finished, growing, or left behind by a crash.
-        board: of the radar, with its calibration, instead of the recording's own: a board's file, a name, or a board.
-            By default that of the environment variable `BOARD`, if a command has set it for its jobs.
+        path: an ``.h5`` file: complete, growing, or interrupted.
+        board: board of the radar with its calibration, instead of the recording's: a board file, a name, or a board. By
+            default that in the environment variable `BOARD`, if a command has set it for its jobs.
 
     Attributes:
-        config: of the radar.
+        config: configuration of the radar.
         times: (frame,) s, starts of the frames' first chirps.
 
     Raises:
@@ -101,9 +101,9 @@ class Recording:
         ]  # fmt: skip
 
     def _leave_out_unwritten(self) -> None:
-        """Leave out frames at the end that have neither stamps nor samples: those that were about to be written."""
-        mended, count = set(self._stamps.mended.tolist()), len(self._stamps.rows)
-        while self._adc is not None and count and (row := int(self._stamps.rows[count - 1])) in mended:
+        """Leave out frames at the end without stamps and samples: those whose writing was interrupted."""
+        corrected, count = set(self._stamps.corrected.tolist()), len(self._stamps.rows)
+        while self._adc is not None and count and (row := int(self._stamps.rows[count - 1])) in corrected:
             if self._rows_of(self._adc).stored(row):
                 break
             count -= 1
@@ -112,7 +112,7 @@ class Recording:
 
     @property
     def damage(self) -> list[str]:
-        """Sentences on what of the file is damaged, as far as it has been read; empty for a sound one.
+        """Sentences on the damage of the file, as far as it has been read; empty without damage.
 
         Example:
             >>> rec = rz.load("walk.h5")
@@ -135,7 +135,7 @@ class Recording:
         return len(self.times)
 
     def __getitem__(self, frames: int | slice) -> "Clip":
-        """Some frames; none of them is read before it is asked for.
+        """Return some frames, without reading them yet.
 
         Raises:
             IndexError: there is no frame of this number.
@@ -159,12 +159,12 @@ class Recording:
 
     @property
     def has_samples(self) -> bool:
-        """Whether raw samples were kept."""
+        """Whether the recording has raw samples."""
         return self._adc is not None
 
     @property
     def attributes(self) -> dict[str, object]:
-        """Scene, seed, versions and the like.
+        """Attributes of the file: scene, seed, versions, ...
 
         Raises:
             InputError: they are damaged.
@@ -173,17 +173,17 @@ class Recording:
             return {k: v.item() if isinstance(v, np.generic) else v for k, v in self.file.attrs.items()}
 
     def adc(self, start: int, stop: int) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
-        """Raw samples of frames start...stop-1; zero where a frame's chunk on disk is damaged, see `valid`.
+        """Return raw samples of frames start to stop - 1; zero if a frame's chunk is damaged, see `valid`.
 
         Raises:
-            InputError: only heat maps were kept.
+            InputError: the recording has heat maps only.
         """
         if self._adc is None:
             raise InputError(f"{self.path}: has no raw samples, only heat maps, expected a recording with /radar/adc")
         return self._frames(self._adc, start, stop)
 
     def valid(self, start: int, stop: int) -> Bool[np.ndarray, "frame loop tx"]:
-        """Per chirp: False where samples were lost, or their frame cannot be unpacked."""
+        """Return per chirp, False if samples were lost or its frame cannot be unpacked."""
         valid = self._frames(self._valid, start, stop)
         if self._adc is not None and len(valid):
             rows = self._stamps.rows[start:stop]
@@ -197,7 +197,7 @@ class Recording:
         return self._read[data.name]
 
     def _frames(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
-        """Rows of frames start...stop-1, of data with a row for each."""
+        """Return rows start to stop - 1 of data with a row per frame."""
         with explained(f"{self.path}: frames {start}...{stop - 1} of {data.name} cannot be read"):
             rows = self._stamps.rows[start:stop]
             first = int(rows[0]) if len(rows) else 0
@@ -206,18 +206,18 @@ class Recording:
             return found if len(places) == len(found) else found[places]
 
     def batches(self, size: int = 32) -> Iterator[tuple[slice, np.ndarray]]:
-        """Frames in batches, as (slice of frames, raw samples)."""
+        """Yield frames in batches, as (slice of frames, raw samples)."""
         for start in range(0, len(self), size):
             stop = min(start + size, len(self))
             yield slice(start, stop), self.adc(start, stop)
 
     def has(self, name: str) -> bool:
-        """Whether a data set such as ``truth/pose`` is there."""
+        """Return whether there is a data set such as ``truth/pose``."""
         with explained(f"{self.path}: is damaged"):
             return name in self.file
 
     def read(self, name: str) -> np.ndarray:
-        """A whole data set by path; of a stream, nothing past the last whole frame.
+        """Read a whole data set by path; a stream is cut after the last complete frame.
 
         Raises:
             InputError: there is none of that name, or it is damaged.
@@ -226,17 +226,17 @@ class Recording:
         return self.rows(name, 0, len(self)) if self._clock(data) else self._slice(data)
 
     def true_poses(self) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]] | None:
-        """Stamps (s) and poses (position m, quaternion x y z w) of the truth where it is known; None without truth."""
+        """Return stamps (s) and poses (position m, quaternion x y z w) of the known truth; None without truth."""
         if not (self.has("truth/time") and self.has("truth/pose")):
             return None
         times, poses = self.read("truth/time"), self.read("truth/pose")
         shared = min(len(times), len(poses))
-        seen = np.isfinite(poses[:shared]).all(axis=1)  # a tracking camera may have been blind for a while
+        seen = np.isfinite(poses[:shared]).all(axis=1)  # a tracking camera may lose tracking for a while
         return times[:shared][seen], poses[:shared][seen]
 
     @property
     def truth(self) -> Trajectory | None:
-        """True poses where they are known, with velocities and floor plan where these are; None without truth."""
+        """True poses where known, with velocities and floor plan if known; None without truth."""
         if (poses := self.true_poses()) is None:
             return None
         velocity = self.read("truth/velocity") if self.has("truth/velocity") else np.zeros((0, 3))
@@ -245,12 +245,12 @@ class Recording:
         return Trajectory(*poses, velocity=known, floor_plan=plan, name="truth")
 
     def rows(self, name: str, start: int, stop: int) -> np.ndarray:
-        """Rows of a stream that belong to frames start...stop-1.
+        """Read the rows of a stream that belong to frames start to stop - 1.
 
-        Of a stream at its own rate: from the first frame's start until the frame after the last starts.
+        A stream at its own rate is read from the start of the first frame to the start of the frame after the last.
 
         Raises:
-            InputError: there is none of that name, it is no stream, or it is damaged.
+            InputError: there is none of this name, it is not a stream, or it is damaged.
         """
         data = self._dataset(name)
         if not (clock := self._clock(data)):
@@ -263,12 +263,12 @@ class Recording:
         ticks = self._clocks[clock][first:last]
         if ticks.dtype.kind == "f" or len(self._stamps.rows) == len(self._stamps.written):
             return found
-        numbers = np.searchsorted(self._stamps.rows, ticks)  # of frames, where some rows are none
+        numbers = np.searchsorted(self._stamps.rows, ticks)  # of frames, if some rows are left out
         known = np.isin(ticks, self._stamps.rows)[: len(found)]
         return (numbers.astype(found.dtype) if name == clock else found)[known]
 
     def _clock(self, data: h5py.Dataset) -> str:
-        """Name of the data set that says what a stream's rows belong to; empty where there is none."""
+        """Return the name of the data set with the frame or time of a stream's rows; empty if there is none."""
         with explained(f"{self.path}: {data.name} is damaged"):
             clock = str(data.attrs.get("clock", ""))
             if clock and not data.ndim:
@@ -276,7 +276,7 @@ class Recording:
             return clock
 
     def _row(self, clock: str, frame: int) -> int:
-        """First row of a stream at its own rate that belongs to `frame` or a later one."""
+        """Return the first row of a stream at its own rate that belongs to `frame` or a later one."""
         if clock not in self._clocks:
             self._clocks[clock] = self._slice(self._dataset(clock))
         ticks = self._clocks[clock]
@@ -303,21 +303,21 @@ class Recording:
             return data[...]
 
     def names(self) -> list[str]:
-        """Paths of all data sets."""
+        """Return the paths of all data sets."""
         found: list[str] = []
         with explained(f"{self.path}: its data sets cannot be listed"):
             self.file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
         return found
 
     def describe(self, name: str) -> dict[str, object]:
-        """Shape, type, unit and meaning of a data set."""
+        """Return shape, type, unit and meaning of a data set."""
         data = self._dataset(name)
         with explained(f"{self.path}: /{name} is damaged"):
             notes = {key: str(data.attrs.get(key, "")) for key in ("unit", "about")}
             return {"shape": data.shape, "dtype": str(data.dtype), **notes}
 
     def labels(self, name: str) -> tuple[str, ...]:
-        """What the values 0, 1, ... of a data set stand for; empty where they are numbers.
+        """Return the meaning of the values 0, 1, ... of a data set; empty if they are numbers.
 
         Raises:
             InputError: there is no data set of that name.
@@ -327,13 +327,14 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """Some frames of a recording, by ``recording[start:stop:step]``, or one of them, by ``recording[number]``. Samples
-    are read when they are asked for.
+    """Some frames of a recording, ``recording[start:stop:step]``, or a single one, ``recording[number]``. Samples are
+    read
+        on access.
 
     Attributes:
-        recording: that they are of.
-        numbers: of the frames, counted from 0.
-        alone: it is one frame, and what is made of it has no axis of frames.
+        recording: the recording.
+        numbers: numbers of the frames, counted from 0.
+        alone: whether it is a single frame, so that results have no axis of frames.
     """
 
     recording: Recording
@@ -359,12 +360,12 @@ class Clip:
 
     @property
     def span(self) -> range:
-        """Numbers of the frames, those included that lie between every N-th."""
+        """Numbers of the frames from the first to the last, including those skipped by a step."""
         return range(self.numbers.start, self.numbers.stop)
 
     @property
     def config(self) -> RadarConfig:
-        """Of a radar that delivers no more frames than these."""
+        """Configuration of the radar with the frame period of these frames."""
         return self.recording.config.every(self.numbers.step)
 
     @property
@@ -374,7 +375,7 @@ class Clip:
 
     @property
     def samples(self) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
-        """Raw I/Q, ADC counts.
+        """Raw I/Q samples, ADC counts.
 
         Raises:
             InputError: see `Recording.adc`.
@@ -383,12 +384,12 @@ class Clip:
 
     @property
     def valid(self) -> Bool[np.ndarray, "frame loop tx"]:
-        """Per chirp: False where samples were lost."""
+        """Per chirp, False if samples were lost."""
         return self._every(self.recording.valid)
 
     @property
     def truth(self) -> Trajectory | None:
-        """The part of `Recording.truth` from the first frame's start until the frame after the last starts."""
+        """The part of `Recording.truth` from the start of the first frame to the start of the frame after the last."""
         if (truth := self.recording.truth) is None or not len(self):
             return truth
         first, last = self.recording.times[[self.numbers[0], self.numbers[-1]]]

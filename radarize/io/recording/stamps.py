@@ -1,7 +1,7 @@
 """Stamps of a recording's frames, some of which may be damaged.
 
-A stamp is damaged if it is no number, or out of order with most others. It is made anew from the stamps around it where
-these say that no frame is missing between them; the frames of all others are left out.
+A stamp is damaged if it is not a number, or out of order with most others. It is interpolated from the stamps around it
+if these show that no frame is missing between them; otherwise its frame is left out.
 """
 
 from bisect import bisect_left
@@ -10,34 +10,34 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-#: s, of stamps, also such as count from 1970.
+#: s, largest stamp, for stamps that count from 1970 too.
 _LATEST = 1e11
-#: A first or last stamp further than so many s, and so many times the usual step, from all others is damaged.
+#: s, and number of usual steps: a first or last stamp farther than both from all others is damaged.
 _FAR, _STEPS = 10.0, 100
-#: Times that such stamps are looked for at either end.
+#: Number of searches for such stamps at either end.
 _ROUNDS = 3
 
 
 @dataclass
 class Stamps:
-    """Stamps of frames that ascend.
+    """Ascending stamps of frames.
 
     Args:
         written: stamps in the file, s.
-        period: of the frames by the configuration, s.
+        period: configured frame period, s.
 
     Attributes:
         times: (frame,) s, ascending.
-        rows: (frame,) rows of the file that the frames are in, ascending.
-        mended: rows whose stamps are made anew.
-        left_out: rows without a frame, for no stamp can be made.
+        rows: (frame,) rows of the file with these frames, ascending.
+        corrected: rows whose stamps are interpolated.
+        left_out: rows without a frame, since no stamp can be determined.
     """
 
     written: Float[np.ndarray, "row"]
     period: float
     times: Float[np.ndarray, "frame"] = field(init=False)
     rows: Int[np.ndarray, "frame"] = field(init=False)
-    mended: Int[np.ndarray, "mended"] = field(init=False)
+    corrected: Int[np.ndarray, "corrected"] = field(init=False)
     left_out: Int[np.ndarray, "left"] = field(init=False)
 
     def __post_init__(self):
@@ -48,26 +48,26 @@ class Stamps:
             self.times, made = _filled(self.written, good, self.period)
         self.rows = np.flatnonzero(made)
         self.times = self.times[self.rows]
-        self.mended, self.left_out = np.flatnonzero(made & ~good), np.flatnonzero(~made)
+        self.corrected, self.left_out = np.flatnonzero(made & ~good), np.flatnonzero(~made)
 
     def keep(self, rows: Bool[np.ndarray, "frame"]) -> None:
-        """Leave further frames out."""
+        """Leave out further frames."""
         self.left_out = np.union1d(self.left_out, self.rows[~rows])
         self.times, self.rows = self.times[rows], self.rows[rows]
-        self.mended = np.intersect1d(self.mended, self.rows)
+        self.corrected = np.intersect1d(self.corrected, self.rows)
 
     def warnings(self) -> list[str]:
-        """A sentence on damaged stamps, where there are any."""
-        damaged = len(self.mended) + len(self.left_out)
+        """Return a sentence on damaged stamps, if there are any."""
+        damaged = len(self.corrected) + len(self.left_out)
         if not damaged:
             return []
-        found = [f"{len(self.mended)} are made anew from the frame period"] if len(self.mended) else []
+        found = [f"{len(self.corrected)} are interpolated by the frame period"] if len(self.corrected) else []
         found += [f"{len(self.left_out)} frames are left out"] if len(self.left_out) else []
         return [f"{damaged} of {len(self.written)} stamps in /radar/time are damaged: {', '.join(found)}"]
 
 
 def _trusted(stamps: Float[np.ndarray, "row"]) -> Bool[np.ndarray, "row"]:
-    """The most stamps that ascend, without a first or last one that is far from all others."""
+    """Return the largest set of ascending stamps, without a first or last one that is far from all others."""
     possible = np.isfinite(stamps) & (np.abs(np.nan_to_num(stamps)) <= _LATEST)
     for _ in range(_ROUNDS):
         rows = np.flatnonzero(possible)
@@ -86,7 +86,7 @@ def _trusted(stamps: Float[np.ndarray, "row"]) -> Bool[np.ndarray, "row"]:
 
 
 def _ascending(values: Float[np.ndarray, "value"]) -> list[int]:
-    """The longest strictly ascending subsequence, as places; of equal values the first (patience sorting)."""
+    """Return indices of the longest strictly ascending subsequence; the first of equal values (patience sorting)."""
     lowest: list[float] = []  # last values of the subsequences of each length
     last: list[int] = []
     before = np.full(len(values), -1)
@@ -108,7 +108,7 @@ def _ascending(values: Float[np.ndarray, "value"]) -> list[int]:
 def _filled(
     stamps: Float[np.ndarray, "row"], good: Bool[np.ndarray, "row"], period: float
 ) -> tuple[Float[np.ndarray, "row"], Bool[np.ndarray, "row"]]:
-    """Stamps with those made anew for damaged ones, and which are of use."""
+    """Return stamps with damaged ones interpolated, and which of them are usable."""
     rows, times, made = np.flatnonzero(good), stamps.copy(), good.copy()
     if not len(rows):
         return period * np.arange(len(stamps)), np.ones(len(stamps), bool)
@@ -116,7 +116,7 @@ def _filled(
     step = float(np.median(np.diff(stamps[rows]) / counts)) if len(rows) > 2 else period
     for first, count in zip(rows[:-1][counts > 1], counts[counts > 1], strict=True):
         between = stamps[first + count] - stamps[first]
-        if abs(between - count * step) < step / 2:  # none is missing
+        if abs(between - count * step) < step / 2:  # no frame is missing
             times[first : first + count] = stamps[first] + between * np.arange(count) / count
             made[first : first + count] = True
     ends = np.r_[0 : rows[0], rows[-1] + 1 : len(stamps)]

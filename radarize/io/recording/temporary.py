@@ -1,4 +1,4 @@
-"""Recordings that nobody wants to keep as a file."""
+"""Recordings in temporary files."""
 
 import shutil
 import tempfile
@@ -10,7 +10,8 @@ from radarize.io.recording.reader import Recording
 
 
 def in_temporary_file(write: Callable[[Path], object], name: str = "recording.h5") -> Recording:
-    """A recording that `write` writes to a path; its file is removed with the object, or when the process ends."""
+    """Return a recording that `write` writes to a path; its file is deleted with the object, or when the process
+    ends."""
     folder = Path(tempfile.mkdtemp(prefix="radarize-"))
     try:
         write(folder / name)

@@ -1,4 +1,5 @@
-"""Data sets of which some rows cannot be unpacked: a bad sector, a cut copy, a block that never reached the disk."""
+"""Data sets with rows that cannot be unpacked, due to a bad sector, a truncated copy, or a block that was not
+written."""
 
 import h5py
 import numpy as np
@@ -6,30 +7,30 @@ from isal import isal_zlib
 from isal.igzip_lib import IsalError
 from jaxtyping import Bool, Shaped
 
-#: What h5py and isal raise of damaged chunks.
+#: Errors that h5py and isal raise for damaged chunks.
 _UNREADABLE: tuple[type[Exception], ...] = OSError, RuntimeError, ValueError, IsalError  # type: ignore[assignment]
 _UNKNOWN, _WHOLE, _DAMAGED = range(3)
 
 
 class Rows:
-    """Rows of a chunked data set; those that cannot be unpacked hold its fill value (samples: zero).
+    """Rows of a chunked data set; those that cannot be unpacked have the fill value (samples: zero).
 
     Args:
-        data: of at least one axis.
+        data: data set with at least one axis.
     """
 
     def __init__(self, data: h5py.Dataset):
         self.data = data
         self._state = np.zeros(len(data), np.uint8)
         self._one_each = data.chunks is not None and data.chunks[0] == 1
-        # Of a chunk that is not in the file, HDF5 gives fill values without a word.
+        # HDF5 silently returns fill values for a chunk that is missing in the file.
         self._all_there = not self._one_each or data.id.get_num_chunks() >= len(data)
         made = data.id.get_create_plist()
         filters = [made.get_filter(k)[0] for k in range(made.get_nfilters())]
         self._packed = self._one_each and filters == [h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE]
 
     def read(self, start: int, stop: int) -> Shaped[np.ndarray, "row ..."]:
-        """Rows start...stop-1, as many as there are."""
+        """Read rows start to stop - 1, as far as there are any."""
         stop = min(stop, len(self.data))
         if self._all_there:
             try:
@@ -51,17 +52,17 @@ class Rows:
         return rows
 
     def whole(self, start: int, stop: int) -> Bool[np.ndarray, "row"]:
-        """Which of rows start...stop-1 can be unpacked. Those that nobody has read yet are tried."""
+        """Return which of rows start to stop - 1 can be unpacked. Rows that were not read yet are tried."""
         for row in start + np.flatnonzero(self._state[start:stop] == _UNKNOWN):
             self._state[row] = _WHOLE if self._unpacks(int(row)) else _DAMAGED
         return self._state[start:stop] != _DAMAGED
 
     def damaged(self) -> Bool[np.ndarray, "row"]:
-        """Rows that cannot be unpacked, of those that anybody has read or tried."""
+        """Return which rows cannot be unpacked, out of those read or tried so far."""
         return self._state == _DAMAGED
 
     def stored(self, row: int) -> bool:
-        """Whether anything of a row is in the file."""
+        """Return whether the file has any data of a row."""
         return not self._one_each or self._there(row)
 
     def _there(self, row: int) -> bool:
@@ -74,7 +75,8 @@ class Rows:
             return False
 
     def _unpacks(self, row: int) -> bool:
-        """Whether a row's chunk can be unpacked; deflate's checksum tells, in half of HDF5's time."""
+        """Return whether a row's chunk can be unpacked; deflate's checksum is tested, which takes half of HDF5's
+        time."""
         if not self._there(row):
             return False
         try:

@@ -1,10 +1,10 @@
-"""Writing a recording frame by frame, and adding to a finished one.
+"""Writer of recordings, frame by frame, and adding data to complete ones.
 
-A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
-recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
-flushed so far. What is flushed is also brought to the disk itself (fsync), at most twice a second by the clock on the
-wall, so a power cut costs a capture what came in the last second. No clock of the writing machine goes into the file or
-its layout: same content, same bytes.
+A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once per second of
+recorded time in HDF5's single-writer-multiple-reader mode, so that a reader, also after a crash, sees every flushed
+frame. Flushed data is also written to the disk (fsync), at most twice per second of wall-clock time, so that a power
+cut loses at most the last second of a capture. The clock of the writing machine affects neither the file nor its
+layout: same content, same bytes.
 """
 
 import errno
@@ -30,27 +30,26 @@ from radarize.io.recording.losses import Losses
 from radarize.io.replacing import replacing
 from radarize.radar.config import RadarConfig
 
-#: Bytes claimed of the disk beyond what is written, for HDF5's own structures. HDF5 writes chunks when it drops them
-#: from its cache, where h5py reports no error: they must have their place on the disk before.
+#: Bytes reserved on the disk beyond the written ones, for HDF5's own structures. HDF5 writes chunks when it evicts them
+#: from its cache, where h5py reports no errors, so their place on the disk is reserved before.
 _RESERVE = 512 << 10
-#: s from one fsync to the next at least: flushes of a capture come once a second, of an import far more often.
+#: s, minimum time between two fsync: flushes of a capture come once per second, of an import far more often.
 _PACE = 0.5
-#: Of the layout.
+#: Version of the file layout.
 _FORMAT = 1
 
 
 @dataclass(frozen=True)
 class Stream:
-    """A data set that grows with the recording, one row per appended item.
+    """Description of a data set that grows with the recording, one row per appended item.
 
     Attributes:
         shape: shape of one row.
         dtype: numpy type.
         unit: SI unit, or what the columns are.
         about: one sentence for the reader.
-        clock: data set that says which instant (float, s) or frame (integer) each row belongs to; ``radar/time``: the
-            rows are the frames.
-        labels: what the values 0, 1, ... stand for, where they stand for something.
+        clock: data set with the time (float, s) or frame (integer) of each row; ``radar/time``: one row per frame.
+        labels: meaning of the values 0, 1, ..., if they are not numbers.
     """
 
     shape: tuple[int, ...]
@@ -71,24 +70,24 @@ class Product:
 
 
 class RecordingWriter:
-    """Writes a recording frame by frame; use as a context manager.
+    """Context manager that writes a recording frame by frame.
 
     Args:
-        path: file to write; its ``.part`` neighbour holds the frames until the writer is closed.
-        cfg_text: original configuration text, kept as it is.
+        path: file to write; frames are in its ``.part`` until the writer is closed.
+        cfg_text: original configuration text, stored unchanged.
         attributes: scene, seed, command and the like, stored as attributes of the file.
         streams: growing data sets by path, e.g. ``"truth/pose"``.
         products: fixed data sets by path.
-        raw: False for a recording without samples (heat maps for training): `append` then takes None for them.
-        overwrite: replace a recording of a radar, too, which cannot be made again.
+        raw: False for a recording without samples (heat maps for training); `append` then takes None for them.
+        overwrite: replace an existing recording of a radar.
 
     Attributes:
-        frames: flushed so far.
-        losses: of the frames appended so far.
+        frames: number of frames flushed so far.
+        losses: statistics of the frames appended so far.
 
     Raises:
-        InputError: the file cannot be created, or another program writes it; a recording of a radar is there already.
-        DiskFull: of any call. Nothing is spoiled: what was to be appended may be left out, and writing go on.
+        InputError: the file cannot be created, another program writes it, or it is an existing recording of a radar.
+        DiskFull: raised by any call. The file stays consistent: the data may be left out, and writing continue.
     """
 
     def __init__(
@@ -117,10 +116,10 @@ class RecordingWriter:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if self.part.exists():
-                os.close(hold(self.part))  # of one who died, or refused
+                os.close(hold(self.part))  # of a process that died; else refused
             self._room = os.open(self.part, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o666)
             try:
-                self._claim(sum(product.data.nbytes for product in (products or {}).values()))
+                self._reserve(sum(product.data.nbytes for product in (products or {}).values()))
             except OSError:
                 os.close(self._room)
                 self.part.unlink()
@@ -162,11 +161,11 @@ class RecordingWriter:
         *,
         rows: Mapping[str, np.ndarray] | None = None,
     ) -> None:
-        """Append frames, and rows of other streams by path, which count as soon as the frames do.
+        """Append frames, and rows of other streams by path, which become visible together with the frames.
 
         Raises:
             InputError: the shapes do not fit the configuration.
-            DiskFull: they may be left out, and later ones appended.
+            DiskFull: the frames may be left out, and later ones appended.
         """
         rows = dict(rows or {})
         if self.raw:
@@ -179,8 +178,8 @@ class RecordingWriter:
             rows["radar/adc"] = adc
         if valid is None:
             valid = np.ones((len(time), *self.config.frame_shape[:2]), bool)
-        with self._telling("write"):
-            self._claim(sum(np.asarray(data).nbytes for data in rows.values()))
+        with self._reporting("write"):
+            self._reserve(sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
                 self._extend(name, data)
             self._extend("radar/valid", valid)
@@ -193,26 +192,26 @@ class RecordingWriter:
 
     def extend(self, name: str, data: np.ndarray) -> None:
         """Append rows to a stream that runs at its own rate (an IMU)."""
-        with self._telling("write"):
-            self._claim(data.nbytes)
+        with self._reporting("write"):
+            self._reserve(data.nbytes)
             self._extend(name, data)
 
-    def _claim(self, size: int) -> None:
-        """Have the disk set so many bytes aside behind what is written, so that nobody else can take them.
+    def _reserve(self, size: int) -> None:
+        """Reserve bytes on the disk behind the written ones, so that other programs cannot take them.
 
         Raises:
-            OSError: it has not as many; what was appended before has its place.
+            OSError: there is not enough space; data appended earlier has its place.
         """
         waiting, end = self._waiting + size, self._file.id.get_filesize() if self._file else 0
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(self._room, end, waiting + _RESERVE)
-        elif shutil.disk_usage(self.part).free < waiting + _RESERVE:  # macOS: others may be quicker
+        elif shutil.disk_usage(self.part).free < waiting + _RESERVE:  # macOS: other programs may use it first
             raise OSError(errno.ENOSPC, FULL)
         self._waiting = waiting
 
     @property
     def _opened(self) -> h5py.File:
-        assert self._file is not None  # once the writer is made
+        assert self._file is not None  # set in the constructor
         return self._file
 
     def _extend(self, name: str, data: np.ndarray) -> None:
@@ -220,19 +219,19 @@ class RecordingWriter:
             _lengthen(self._opened[name], data)
 
     def annotate(self, **attributes: object) -> None:
-        """Attributes of the file that are known only at the end; stored when the writer is closed."""
+        """Set attributes of the file that are known at the end only; stored when the writer is closed."""
         self._notes.update(attributes)
 
     def flush(self) -> None:
-        """Make every appended frame visible to readers. Times go last: a frame counts once its time is there.
+        """Make all appended frames visible to readers. Times are written last: a frame counts once its time is written.
 
-        So do they on the disk: what the system has not been asked to write, it may write in any order.
+        The same order holds on the disk, by fsync; without it, the system may write in any order.
         """
         self._opened.flush()
         if due := clock.monotonic() - self._synced >= _PACE:
             os.fsync(self._room)
         self._waiting = 0
-        self._claim(0)  # HDF5 cuts the file to what it holds
+        self._reserve(0)  # HDF5 truncates the file to its content
         for times in self._pending:
             self._extend("radar/time", times)
             self.frames += len(times)
@@ -244,22 +243,22 @@ class RecordingWriter:
         self._unflushed = 0
 
     @contextmanager
-    def _telling(self, what: str) -> Iterator[None]:
-        """Say what could not be done."""
+    def _reporting(self, what: str) -> Iterator[None]:
+        """Turn write errors into an InputError that names the failed step."""
         try:
             yield
         except (OSError, RuntimeError) as error:
             raise _failed(what, self.part, error) from error
 
     def close(self, keep_part: bool = False) -> None:
-        """Flush, close and give the file its final name, unless `keep_part`."""
+        """Flush, close and rename the file to its final name, unless `keep_part`."""
         if self._file:
-            with self._telling("finish"):
+            with self._reporting("finish"):
                 self.flush()
-                os.ftruncate(self._room, self._file.id.get_filesize())  # what was claimed and not used
+                os.ftruncate(self._room, self._file.id.get_filesize())  # release unused reserved bytes
                 self._file.close()
                 os.close(self._held)
-                if self._notes:  # HDF5 takes no new attributes while readers may follow
+                if self._notes:  # HDF5 accepts no new attributes in this mode
                     with open_hdf5(self.part, mode="r+") as file:
                         file.attrs.update(_storable(self._notes))
                 os.fsync(self._room)
@@ -272,7 +271,7 @@ class RecordingWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        # An interrupt ends a recording, it does not spoil it: everything appended so far is kept under its name.
+        # An interrupt completes a recording: all appended frames are kept under its name.
         if kind is None or issubclass(kind, KeyboardInterrupt):
             self.close()
         else:
@@ -281,7 +280,7 @@ class RecordingWriter:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring a folder's names to the disk, where the system knows how."""
+    """Write a folder's entries to the disk, if the system supports it."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -302,17 +301,17 @@ def add(
     products: Mapping[str, Product] | None = None,
     attributes: Mapping[str, object] | None = None,
 ) -> Path:
-    """Add streams to a recording, which is replaced as a whole.
+    """Add streams and products to a recording, which is replaced as a whole.
 
     Args:
-        path: recording, which nobody writes.
-        streams: by path.
-        rows: of each stream, all.
+        path: recording that is not being written.
+        streams: streams by path.
+        rows: all rows of each stream.
         products: data sets written once, by path.
-        attributes: of the file, to replace or add.
+        attributes: attributes of the file to replace or add.
 
     Raises:
-        InputError: it is there already, or the file cannot be written.
+        InputError: a data set exists, or the file cannot be written.
     """
     with replacing(path) as part:
         shutil.copyfile(path, part)
@@ -332,7 +331,7 @@ def add(
 
 
 def _lengthen(target: h5py.Dataset, data: np.ndarray) -> None:
-    """Put rows behind those that a stream's data set has."""
+    """Append rows to a stream's data set."""
     start = len(target)
     target.resize(start + len(data), axis=0)
     if target.compression is None or target.chunks[0] > 1:
@@ -343,18 +342,18 @@ def _lengthen(target: h5py.Dataset, data: np.ndarray) -> None:
 
 
 def _packed(row: np.ndarray) -> bytes:
-    """A chunk of one row as HDF5's filters would store it, bytes shuffled and deflated, in an eighth of their time."""
+    """Return a chunk of one row as HDF5's filters would store it, bytes shuffled and deflated, in 1/8 of their time."""
     by_byte = np.ascontiguousarray(row).view(np.uint8).reshape(-1, row.itemsize).T
     return isal_zlib.compress(np.ascontiguousarray(by_byte), 1)
 
 
 def fix(file: h5py.File, name: str, product: Product) -> None:
-    """A data set that is written once."""
+    """Create a data set that is written once."""
     file.create_dataset(name, data=product.data).attrs.update({"unit": product.unit, "about": product.about})
 
 
 def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:
-    """A stream's data set, without rows yet."""
+    """Create the data set of a stream, without rows yet."""
     per_row = int(np.prod(stream.shape, dtype=int)) * np.dtype(stream.dtype).itemsize
     rows = int(np.clip(16384 // max(per_row, 1), 1, 1024))
     packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if per_row >= 1024 else {}
@@ -374,7 +373,7 @@ def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:
 
 
 def _storable(attributes: Mapping[str, object]) -> dict[str, object]:
-    """Attributes in which text is what HDF5 takes for it: no NUL, and nothing that UTF-8 cannot say."""
+    """Return attributes with text that HDF5 accepts: without NUL, and valid as UTF-8."""
     return {
         name: value.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
         if isinstance(value, str)
@@ -384,7 +383,7 @@ def _storable(attributes: Mapping[str, object]) -> dict[str, object]:
 
 
 def _unwritten(name: str, stream: Stream) -> float | int | None:
-    """What stands in rows that were never written: a clock must stay in order whatever was lost of its end."""
+    """Return the fill value of rows that were not written; a clock stays ascending even if its end is lost."""
     kind = np.dtype(stream.dtype)
     if kind.kind == "f":
         return np.nan

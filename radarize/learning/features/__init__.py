@@ -1,1 +1,1 @@
-"""What networks see: maps of a frame, windows of a stream, tables of whole recordings."""
+"""Input of networks: maps of a frame, windows of a stream, tables of whole recordings."""

@@ -1,8 +1,8 @@
-"""What a net must not learn from: handedness, and how one radar differs from another.
+"""Augmentation of maps: mirrored scenes, and differences between radars, from which a network should not learn.
 
-All take maps as (item, frame, map, row, azimuth), in dB or, where it says so, as powers, draw from a generator on their
-device, and treat each item by itself. Maps have no phases: what mismatched channels and lost chirps do is imitated by
-what they do to powers.
+All functions take maps as (item, frame, map, row, azimuth), in dB or, if stated, as powers, use a generator on their
+device, and treat each item separately. Maps have no phases, so mismatched channels and lost chirps are imitated by
+their effect on powers.
 """
 
 import math
@@ -13,7 +13,7 @@ from torch import Generator, Tensor
 
 from radarize.signal.maps import FLOOR, Maps
 
-#: A map's cell averages about as many looks: the spread of noise about its mean.
+#: Number of independent samples averaged in a cell of a map, which determines the spread of noise about its mean.
 _LOOKS = 32
 
 
@@ -21,29 +21,29 @@ Chosen = Bool[Tensor, "item 1 1 1 1"]
 
 
 def chosen(maps: Maps, generator: Generator, share: float = 0.5) -> Chosen:
-    """Which items something happens to."""
+    """Choose the items to change."""
     return torch.rand((len(maps), 1, 1, 1, 1), generator=generator, device=maps.device) < share
 
 
 def mirrored(maps: Maps) -> Maps:
-    """Left is right. Velocities to the left and turns change their signs (paper, section 5)."""
+    """Mirror left and right. Leftward velocities and rotations change sign (paper, section 5)."""
     return maps.flip(4)
 
 
 def receding(maps: Maps) -> Maps:
-    """What closes recedes: velocities change their signs (paper, section 5). The lowest of an even number of Doppler
-    bins has no partner above and, being where speeds alias, is its own."""
+    """Reverse closing speeds: velocities change sign (paper, section 5). With an even number of Doppler bins, the
+    lowest bin, where speeds alias, stays in place."""
     return maps.flip(3).roll(1 - maps.shape[3] % 2, dims=3)
 
 
 def mirrored_columns(label: Shaped[Tensor, "item row bearing"], unknown: int) -> Tensor:
-    """A label of bearings -44...+43 deg, mirrored: bearing +44, which -44 becomes, was never labelled."""
+    """Mirror a label of bearings -44 to +43 deg; bearing +44, which -44 becomes, has no label."""
     return torch.cat([torch.full_like(label[..., :1], unknown), label[..., 1:].flip(-1)], dim=-1)
 
 
 def other_radar(maps: Maps, generator: Generator, doppler: bool) -> Maps:
-    """The same scene (dB) by a radar of other gains, noise and channels, which loses chirps where rows are Doppler, not
-    range bins; each of it for half the items."""
+    """Imitate the same scene (dB) seen by a radar with other gains, noise and channels, and with lost chirps if rows
+    are Doppler bins; each effect for half of the items."""
     power = 10 ** (maps / 10)
     for effect in (noise, mismatch, lost_chirps if doppler else range_gain):
         power = effect(power, generator, chosen(maps, generator))
@@ -51,12 +51,13 @@ def other_radar(maps: Maps, generator: Generator, doppler: bool) -> Maps:
 
 
 def range_gain(power: Maps, generator: Generator, where: Chosen) -> Maps:
-    """On powers: gain that changes slowly over range by some dB: filters, antenna gain in elevation, exponents."""
+    """Change powers by a gain that varies slowly over range by a few dB, as from filters and antenna gain in
+    elevation."""
     return power * _linear(2.0 * where * _smooth(power, 3, generator))
 
 
 def noise(power: Maps, generator: Generator, where: Chosen) -> Maps:
-    """On powers: receiver noise 15 dB below to 6 dB above what an item's weakest cells have."""
+    """Add receiver noise to powers, 15 dB below to 6 dB above an item's weakest cells."""
     weakest = power.flatten(2)[..., ::16].quantile(0.1, dim=2).amin(dim=1)[:, None, None, None, None]
     level = where * weakest * _linear(_uniform(power, -15.0, 6.0, generator))
     looks = torch.randn(power.shape, generator=generator, device=power.device) / math.sqrt(_LOOKS)
@@ -64,26 +65,26 @@ def noise(power: Maps, generator: Generator, where: Chosen) -> Maps:
 
 
 def mismatch(power: Maps, generator: Generator, where: Chosen) -> Maps:
-    """On powers: antennas of unequal gain and phase: sidelobes 35 to 18 dB down at all azimuths, and a ripple over
-    azimuth."""
+    """Change powers as by antennas of unequal gain and phase: sidelobes at -35 to -18 dB at all azimuths, and a ripple
+    over azimuth."""
     lobes = where * _linear(_uniform(power, -35.0, -18.0, generator)) * power.amax(dim=4, keepdim=True)
     return (power + lobes) * _linear(0.7 * where * _smooth(power, 4, generator))
 
 
 def lost_chirps(power: Maps, generator: Generator, where: Chosen) -> Maps:
-    """On powers: up to a fifth of the chirps lost at random: their energy spreads over all Doppler bins."""
+    """Change powers as by up to a fifth of the chirps lost at random: their energy spreads over all Doppler bins."""
     lost = where * _uniform(power, 0.0, 0.2, generator)
     return power + lost / (1 - lost) * power.mean(dim=3, keepdim=True)
 
 
 def lost_frames(maps: Maps, generator: Generator, share: float = 0.02) -> Maps:
-    """Some frames without any samples."""
+    """Replace some frames by frames without samples."""
     gone = torch.rand((*maps.shape[:2], 1, 1, 1), generator=generator, device=maps.device) < share
     return torch.where(gone, FLOOR, maps)
 
 
 def _smooth(maps: Maps, axis: int, generator: Generator) -> Tensor:
-    """A random smooth curve over an axis for each item, of standard deviation 1 on average."""
+    """Return a random smooth curve over an axis for each item, with a mean standard deviation of 1."""
     size = maps.shape[axis]
     orders = torch.arange(1, 4, device=maps.device)
     waves = torch.cos(math.pi * orders[:, None] * torch.arange(size, device=maps.device) / max(size - 1, 1))

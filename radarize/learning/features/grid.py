@@ -1,7 +1,7 @@
-"""On which cells a map lies, whether two radars' maps lie on the same, and how those of one are brought to the other's.
+"""Grid of a map's cells, comparison of the grids of two radars, and resampling from one to the other.
 
-Networks know metres and m/s by rows and columns of the maps that they were trained on. Maps of other chirps are brought
-to these rows, so that what is far for one radar is far for any.
+A network learns metres and m/s as rows and columns of the maps that it was trained on. Maps of radars with other chirps
+are resampled to these rows, so that a row has the same range or speed for any radar.
 """
 
 import numpy as np
@@ -13,25 +13,25 @@ from radarize.io.plain import Frozen
 from radarize.radar.config import RadarConfig
 from radarize.signal.maps import Maker, MapMaker
 
-#: Steps of range or speed that differ by less read as the same grid.
+#: Relative difference of range or speed steps below which grids count as equal.
 TOLERANCE = 0.01
-#: Of what a network sees in range or speed, the least share that another radar has to see; and how much coarser its
-#: rows may be. What is asked of the array is in `radarize.learning.nets.weights`.
+#: Minimum share of a network's span in range or speed that another radar has to cover, and maximum ratio of its row
+#: step. Requirements on the array are in `radarize.learning.nets.weights`.
 LEAST_SHARE, COARSEST = 0.5, 2.0
 
 
 class MapGrid(Frozen):
-    """Cells of a map: a network that knows one grid reads wrong speeds and ranges off another.
+    """Grid of a map's cells; a network trained on one grid estimates wrong speeds and ranges on another.
 
     Attributes:
-        rows: range bins, or Doppler bins.
-        step: m, or m/s, from row to row.
-        azimuths: columns.
-        field: rad, from the first column to the last.
+        rows: number of range or Doppler bins.
+        step: step between rows, m or m/s.
+        azimuths: number of columns.
+        field: angle from the first column to the last, rad.
         frame_period: s.
     """
 
-    # Limits are those of any radar: files of weights are foreign input.
+    # The limits include any radar; files of weights are foreign input.
     rows: int = Field(ge=1, le=1 << 14)
     step: float = Field(gt=0, le=1e3)
     azimuths: int = Field(ge=1, le=1 << 14)
@@ -40,7 +40,7 @@ class MapGrid(Frozen):
 
     @classmethod
     def of(cls, config: RadarConfig, name: str, maker: type[Maker] = MapMaker) -> "MapGrid":
-        """The grid of a radar's map."""
+        """Return the grid of a radar's map."""
         axes = maker.axes(config, name)
         return cls(
             rows=axes.rows,
@@ -51,7 +51,7 @@ class MapGrid(Frozen):
         )
 
     def difference(self, other: "MapGrid", ignore: tuple[str, ...] = ()) -> str | None:
-        """What differs of another grid, in words; None if nothing does."""
+        """Return the difference from another grid in words; None if they are equal."""
         for name, own in self:
             if name not in ignore and abs(own - getattr(other, name)) > TOLERANCE * abs(own):
                 return f"{name.replace('_', ' ')} {getattr(other, name):.6g} instead of {own:.6g}"
@@ -59,12 +59,12 @@ class MapGrid(Frozen):
 
     @property
     def reach(self) -> float:
-        """m, or m/s from the lowest speed to the highest."""
+        """Span of the rows: m, or m/s from the lowest speed to the highest."""
         return self.rows * self.step
 
     def lack(self, other: "MapGrid", unit: str) -> str | None:
-        """What another radar's maps, with rows in a unit, lack to be brought to this grid, in words; None if nothing
-        does."""
+        """Return in words why another radar's maps, with rows in `unit`, cannot be resampled to this grid; None if they
+        can."""
         coarsest, least = COARSEST * self.step, LEAST_SHARE * self.reach
         if other.step > coarsest:
             return f"bins of {other.step:.3g} {unit}, expected at most {coarsest:.3g} {unit}"
@@ -74,15 +74,16 @@ class MapGrid(Frozen):
 
 
 class Resampling:
-    """Brings maps of a radar to the rows that a network knows.
+    """Resamples maps of a radar to the rows of a network.
 
-    A row is the mean power of what the radar sees about it, weighted by a triangle of the coarser step to either side:
-    finer rows are averaged, coarser ones interpolated. Where the radar sees nothing, a column is as quiet as anywhere.
+    A row is the mean power of the radar's rows around it, weighted by a triangle with a half width of the larger step:
+    finer rows are averaged, coarser ones interpolated. Rows that the radar does not cover get the minimum of their
+    column.
 
     Args:
         known: grid of the network.
         own: grid of the radar.
-        centred: rows are of speeds, zero in the middle; otherwise of ranges, from zero on.
+        centred: whether rows are speeds, with zero in the middle; otherwise ranges, from zero.
     """
 
     def __init__(self, known: MapGrid, own: MapGrid, centred: bool):
@@ -95,14 +96,14 @@ class Resampling:
 
     @classmethod
     def between(cls, known: MapGrid, own: MapGrid, centred: bool) -> "Resampling | None":
-        """None where both have the same rows."""
+        """Return the resampling; None if both grids have the same rows."""
         same = known.rows == own.rows and np.isclose(known.step, own.step, rtol=1e-6)
         return None if same else cls(known, own, centred)
 
     def __call__(
         self, maps: Float[torch.Tensor, "frame map row azimuth"]
     ) -> Float[torch.Tensor, "frame map known azimuth"]:
-        """Maps in dB, from dB."""
+        """Resample maps in dB."""
         power = 10 ** (maps / 10)
         found = self._weights @ power
         found[:, :, self._unseen] = power.amin(dim=2, keepdim=True)
@@ -110,5 +111,5 @@ class Resampling:
 
 
 def _places(grid: MapGrid, centred: bool) -> Float[np.ndarray, "row"]:
-    """Of rows, m or m/s."""
+    """Return the ranges or speeds of the rows, m or m/s."""
     return grid.step * (np.arange(grid.rows) - (grid.rows // 2 if centred else 0))

@@ -1,4 +1,4 @@
-"""Recordings of maps instead of samples."""
+"""Recordings of heat maps instead of samples."""
 
 from pathlib import Path
 
@@ -6,15 +6,15 @@ from radarize.io.recording import Product, Recording, RecordingWriter, Stream
 from radarize.io.recording.recover import along
 from radarize.signal.maps import AZIMUTHS, MAPS, MapMaker
 
-#: Truth as large as samples, which recordings without samples do without.
+#: Truth as large as samples, which is left out.
 _LARGE = ("truth/adc_by_cause",)
 _BATCH = 32
 
 
 def keep_maps(source: Path, output: Path) -> Path:
-    """Turn a recording, simulated or real, into one with maps instead of samples, about 37 % of the size.
+    """Convert a recording, simulated or real, to one with heat maps instead of samples, about 37 % of the size.
 
-    Truth and other streams are kept, except I/Q by cause.
+    Truth and other streams are kept, except I/Q by path type.
 
     Raises:
         InputError: unreadable source, or no space for the output.

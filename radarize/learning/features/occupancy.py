@@ -1,4 +1,4 @@
-"""The label that segmentation learns: which cells of range and bearing are free, and which hold the first surface."""
+"""Label of the segmentation: free cells of range and bearing, and cells with the first surface."""
 
 import numpy as np
 from jaxtyping import UInt8
@@ -11,8 +11,8 @@ from radarize.signal.depthlabel import SURFACE, UNKNOWN
 def on_grid(
     cells: UInt8[np.ndarray, "frame range bearing"], own: MapGrid, known: MapGrid
 ) -> UInt8[np.ndarray, "frame known bearing"]:
-    """Labels of a radar's range bins on those of another: the nearest cell's, but no surface gets lost in between; what
-    the radar does not reach is unknown."""
+    """Resample labels from a radar's range bins to those of another: the nearest cell's state, without losing surfaces;
+    unknown beyond the radar's range."""
     nearest = np.rint(known.step * np.arange(known.rows) / own.step).astype(int)
     found = cells[:, np.minimum(nearest, own.rows - 1)]
     found[:, nearest >= own.rows] = UNKNOWN

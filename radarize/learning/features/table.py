@@ -1,4 +1,4 @@
-"""Recordings' maps, other readings and truth in memory, ready to be indexed: an hour of two range maps takes 1.7 GB."""
+"""Maps, other inputs and truth of recordings in memory, for fast indexing; 1 h of two range maps takes 1.7 GB."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,19 +19,19 @@ from radarize.io.tum import planar
 from radarize.learning.features.grid import MapGrid, Resampling
 from radarize.signal.maps import Maker, MapMaker, maps_of
 
-#: Maps, and all else, of one recording, by name.
+#: Maps, and all other data, of one recording, by name.
 _Read = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What is read of a recording's frames: labels, or what networks see besides maps.
+    """Data read from a recording's frames: labels, or network inputs other than maps.
 
     Attributes:
-        name: of it.
-        where: data set of the recording that it is made of.
-        of: makes it of some of a recording's frames, a row a frame; None: it is those rows of the data set.
-        on_grid: brings rows that lie on a radar's grid (first) to another; None: they lie on none.
+        name: its name.
+        where: data set of the recording that it is computed from.
+        of: function of a recording and a slice of frames that returns a row per frame; None: rows of the data set.
+        on_grid: resamples rows on a radar's grid (first) to another; None: rows have no grid.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Reading:
     on_grid: Callable[[np.ndarray, MapGrid, MapGrid], np.ndarray] | None = None
 
     def rows(self, recording: Recording, frames: slice) -> np.ndarray:
-        """A row for each of some frames."""
+        """Return a row for each of some frames."""
         return self.of(recording, frames) if self.of else recording.read(self.where)[frames]
 
 
@@ -52,7 +52,7 @@ def _yaw(recording: Recording, frames: slice) -> np.ndarray:
     return planar(recording.read("truth/pose")[frames])[:, 2:].astype(np.float32)
 
 
-#: Truth that several methods learn from: m/s (forward, left); rad; m and quaternion.
+#: Truth that several methods train on: m/s (forward, left); rad; m and quaternion.
 VELOCITY = Reading("velocity", "truth/velocity", _velocity)
 YAW = Reading("yaw", "truth/pose", _yaw)
 POSE = Reading("pose", "truth/pose")
@@ -61,15 +61,15 @@ _BATCH = 32
 
 @dataclass(frozen=True, eq=False)
 class FeatureTable:
-    """Frames of recordings, one after the other.
+    """Consecutive frames of several recordings.
 
     Attributes:
-        maps: by name, (frame, row, azimuth) float16, dB.
+        maps: maps by name, (frame, row, azimuth) float16, dB.
         truth: labels by name, (frame, ...).
-        lengths: frames of each recording.
-        grid: of the maps; None without any.
+        lengths: number of frames of each recording.
+        grid: grid of the maps; None without maps.
         frame_period: s.
-        sensed: what else networks see by name, (frame, ...).
+        sensed: other network inputs by name, (frame, ...).
     """
 
     maps: dict[str, Tensor]
@@ -91,20 +91,20 @@ class FeatureTable:
         progress: Callable[..., None] = lambda *where: None,
         grid: MapGrid | None = None,
     ) -> "FeatureTable":
-        """Read recordings of maps, or make the maps of recordings of samples.
+        """Read recordings of maps, or compute the maps of recordings of samples.
 
         Args:
             paths: recordings, of one radar configuration unless there is a grid.
-            maps: names of `maker`'s.
-            truth, sensed: what else to read.
-            maker: of the maps.
-            workers: processes that read; more than one pays where maps have to be made.
+            maps: names of maps of `maker`.
+            truth, sensed: other data to read.
+            maker: class that computes the maps.
+            workers: processes that read; more than one is useful if maps have to be computed.
             progress: called with (stage, recordings done, recordings in all).
-            grid: to which maps of any radar are brought; None: they lie on one already.
+            grid: grid to which maps of any radar are resampled; None: they have a common grid.
 
         Raises:
-            InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is all
-                unknown, or memory does not suffice.
+            InputError: a recording lacks data, has another grid of maps, or has truth that is entirely unknown; or
+                memory does not suffice.
         """
         lengths, periods, grids = zip(*(_open(path, maps, maker, grid) for path in paths), strict=True)
         for path, period, own in zip(paths, periods, grids, strict=True):
@@ -125,11 +125,11 @@ class FeatureTable:
         places = {str(path): slice(end - length, end) for path, end, length in zip(paths, ends, lengths, strict=True)}
         todo = {str(path): partial(_read, path, tuple(maps), (*truth, *sensed), maker, grid) for path in paths}
         if workers > 1 and len(paths) > 1:
-            heard = (news for news in perform(todo, workers) if news.ended)
+            reports = (news for news in perform(todo, workers) if news.ended)
         else:
-            heard = (attempt(name, job, lambda done: None) for name, job in todo.items())
+            reports = (attempt(name, job, lambda done: None) for name, job in todo.items())
         others: dict[str, dict[str, np.ndarray]] = {}
-        for news in heard:
+        for news in reports:
             if news.error is not None:
                 raise news.failure
             made, others[news.name] = cast(_Read, news.result)
@@ -151,22 +151,22 @@ class FeatureTable:
 
     @property
     def duration(self) -> float:
-        """Of all recordings, s."""
+        """Total duration of the recordings, s."""
         return sum(self.lengths) * self.frame_period
 
     def starts(self, reach: int) -> Int[Tensor, "window"]:
-        """Frames that have `reach` - 1 more after them in their recording, with truth and readings that are known."""
+        """Return the frames with `reach` - 1 frames after them in their recording, all with known truth and inputs."""
         first = np.cumsum([0, *self.lengths[:-1]])
         windows = [np.arange(a, a + max(0, n - reach + 1)) for a, n in zip(first, self.lengths, strict=True)]
         found = torch.from_numpy(np.concatenate(windows))
-        blind = torch.zeros(sum(self.lengths) + 1, dtype=torch.int64)  # unknown ones up to each frame
+        unknown = torch.zeros(sum(self.lengths) + 1, dtype=torch.int64)  # number of unknown frames before each frame
         for values in (*self.truth.values(), *self.sensed.values()):
-            blind[1:] |= ~values.isfinite().flatten(1).all(dim=1)
-        blind = blind.cumsum(0)
-        return found[blind[found + reach] == blind[found]]
+            unknown[1:] |= ~values.isfinite().flatten(1).all(dim=1)
+        unknown = unknown.cumsum(0)
+        return found[unknown[found + reach] == unknown[found]]
 
     def divide(self, count: int) -> tuple["FeatureTable", "FeatureTable"]:
-        """The first `count` recordings, and the others."""
+        """Split into the first `count` recordings, and the others."""
         frame = sum(self.lengths[:count])
 
         def part(frames: slice, lengths: Sequence[int]) -> FeatureTable:
@@ -180,18 +180,19 @@ class FeatureTable:
         return part(slice(frame), self.lengths[:count]), part(slice(frame, None), self.lengths[count:])
 
     def on(self, device: torch.device) -> "FeatureTable":
-        """With its maps in a device's memory, where windows are cut out many times faster than they are sent."""
+        """Return the table with its maps in a device's memory, where windows are cut many times faster than
+        transferred."""
         return replace(self, maps={name: values.to(device) for name, values in self.maps.items()})
 
     def window(self, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item frame map row azimuth"]:
-        """Maps of windows of frames."""
+        """Return the maps of windows of frames."""
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
 
 
 def _open(
     path: Path, maps: Sequence[str], maker: type[Maker], grid: MapGrid | None
 ) -> tuple[int, float, dict[str, MapGrid]]:
-    """Frames that networks see, their period, and the grids of their maps: that one, if they are brought to one."""
+    """Return number and period of the frames that networks use, and the grids of their maps (`grid` if given)."""
     with Recording(path) as recording:
         stride = maker.stride(recording.config)
         grids = {name: grid or MapGrid.of(recording.config, name, maker) for name in maps}
@@ -199,14 +200,14 @@ def _open(
 
 
 def _seen(recording: Recording, maker: type[Maker]) -> int:
-    """Frames of a recording that networks see."""
+    """Return the number of frames of a recording that networks use."""
     return max(0, -(-(len(recording) - maker.warmup) // maker.stride(recording.config)))
 
 
 def _read(
     path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], grid: MapGrid | None, _: Report
 ) -> _Read:
-    """Maps, and all else, of one recording, on a grid if there is one."""
+    """Read the maps and other data of one recording, resampled to a grid if given."""
     with Recording(path) as recording:
         maker, count = kind(recording.config), len(recording)
         stride = maker.stride(recording.config)
@@ -226,16 +227,16 @@ def _read(
             if grid is not None and reading.on_grid is not None:
                 rows = reading.on_grid(rows, own[maps[0]], grid)
             found[reading.name] = rows
-            # Some may be unknown: a tracking camera is blind now and then.
+            # Some values may be unknown, since a tracking camera sometimes loses tracking.
             if len(rows) < _seen(recording, kind) or not np.isfinite(rows).any():
-                raise InputError(f"{path}: /{reading.where} lacks values or holds no numbers, expected {count} frames")
+                raise InputError(f"{path}: /{reading.where} lacks values or has no numbers, expected {count} frames")
         return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found
 
 
 def _brought(
     made: Float[np.ndarray, "frame row azimuth"], resampling: Resampling | None
 ) -> Float16[np.ndarray, "frame known azimuth"]:
-    """Maps on another grid, if there is one."""
+    """Resample maps, if there is a resampling."""
     if resampling is None:
         return made.astype(np.float16, copy=False)
     return resampling(torch.from_numpy(made).float()[:, None])[:, 0].half().numpy()

@@ -1,8 +1,8 @@
-"""Windows of a stream: the maps of a frame and of some before it, as networks see them.
+"""Windows of a stream: the maps of a frame and of frames before it, as network input.
 
-Networks know the time between their frames, and what a row of a map means, from training, not from what they see: a
-radar whose frames come twice as often shows them every second one, its maps are brought to the network's grid, and
-where frames are lost, they see no window that spans the gap.
+Networks learn the time between frames, and the meaning of a map's rows, in training. A radar with twice the frame rate
+therefore supplies every second frame, maps are resampled to the network's grid, and no window spans a gap of lost
+frames.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,10 +23,10 @@ class Shown:
     """Windows of one spacing that end at consecutive frames.
 
     Attributes:
-        maps: (frame, window, map, row, azimuth); a frame that is not there looks as the one after the gap, or as the
-            stream's first.
-        whole: (frame,) every frame of the window is there.
-        back: (frame,) frames from the window's first to its last; of no meaning unless it is whole.
+        maps: (frame, window, map, row, azimuth); a missing frame is replaced by the one after the gap, or by the first
+            one of the stream.
+        whole: (frame,) whether all frames of the window are present.
+        back: (frame,) number of frames from the window's first to its last; valid if the window is whole.
     """
 
     maps: Float[torch.Tensor, "frame window map row azimuth"]
@@ -38,11 +38,11 @@ class Windows:
     """Windows that end at the frames of a stream.
 
     Args:
-        maps: names of a frame's.
-        frames: of a window.
-        period: s, from one of the radar's frames to the next.
-        spacings: the radar's frames from one of a window to the next, ascending.
-        resampling: of the radar's maps, to the network's grid; None if they lie on it.
+        maps: names of a frame's maps.
+        frames: number of frames of a window.
+        period: frame period of the radar, s.
+        spacings: spacings between frames of a window, in frames of the radar, ascending.
+        resampling: from the radar's maps to the network's grid; None if they have the same.
     """
 
     def __init__(
@@ -61,18 +61,18 @@ class Windows:
         self._waiting: list[tuple[Callable[[], Made], np.ndarray]] = []  # frames after these, not yet made
 
     def announce(self, make: Callable[[], Made], stamps: Float[np.ndarray, "frame"]) -> None:
-        """The next frames: maps are made of them only if a window that is wanted reaches back to them."""
+        """Add the next frames; their maps are computed only if a requested window includes them."""
         self._waiting.append((make, stamps))
         while len(self._waiting) > 1 and sum(len(past) for _, past in self._waiting[1:-1]) >= self._reach:
             del self._waiting[0]
 
     def wanted(self) -> list[Shown]:
-        """Windows that end at the frames announced last, see `push`."""
+        """Return the windows that end at the frames announced last, see `push`."""
         waiting, self._waiting = self._waiting, []
         return [self.push(make(), stamps) for make, stamps in waiting][-1]
 
     def push(self, made: Made, stamps: Float[np.ndarray, "frame"]) -> list[Shown]:
-        """Windows that end at the next frames, by their maps and stamps (s), for each spacing."""
+        """Return the windows that end at the next frames, given by maps and stamps (s), for each spacing."""
         new = torch.stack([torch.from_numpy(made[name]) for name in self.maps], dim=1).float()
         if self._resampling is not None:
             new = self._resampling(new)
@@ -90,11 +90,11 @@ class Windows:
 def spaced(
     stamps: Float[np.ndarray, "frame"], new: int, frames: int, apart: float, period: float
 ) -> tuple[Int[np.ndarray, "new window"], Bool[np.ndarray, "new window"]]:
-    """Windows of so many frames, `apart` seconds from one to the next, that end at each of the `new` last ones.
+    """Return windows of `frames` frames, `apart` seconds between them, that end at each of the `new` last ones.
 
     Returns:
-        Rows, of a frame that is not there that of the one after the gap; and which are there, give or take half of the
-        radar's frame period.
+        Row of each frame, for a missing frame that of the one after the gap; and which frames are present, within half
+        of the radar's frame period.
     """
     wanted = stamps[len(stamps) - new :, None] - apart * np.arange(frames - 1, -1, -1)
     rows = np.searchsorted(stamps, wanted - period / 2)

@@ -1,1 +1,1 @@
-"""What networks are made of, and the files that their weights are kept in."""
+"""Architectures of networks, their building blocks, and files of weights."""

@@ -1,7 +1,7 @@
-"""Networks as graphs that onnxruntime runs, norms folded into convolutions.
+"""Networks as graphs for onnxruntime, with normalisation folded into convolutions.
 
-The graphs, without weights, come with the package for the networks that run live (`radarize.pipeline.graphs` makes
-them). No graph is ever taken from a file of weights or from beside it. Networks of other shapes run in torch.
+The graphs, without weights, are part of the package for the networks that run live (`radarize.pipeline.graphs` writes
+them). No graph is ever read from a file of weights or beside it. Networks of other shapes run in torch.
 """
 
 import json
@@ -18,28 +18,28 @@ from radarize.learning.nets.weights import Header, Network, load
 from radarize.radar.config import RadarConfig
 
 GRAPHS = Path(__file__).parent / "graphs"
-#: Of a header, what decides the graph.
+#: Fields of a header that determine the graph.
 _SHAPE = ("kind", "setting", "frames", "maps", "width", "grid")
-#: onnxruntime tells of errors alone.
+#: Log level of onnxruntime: errors only.
 _ERRORS = 3
 
 
 class Compiled:
-    """A trained network, ready to be asked.
+    """A trained network for inference.
 
     Args:
         net: the network, whose weights no longer change.
-        header: of its file.
+        header: header of its file.
 
     Attributes:
-        net: the same network, folded; header: the same.
+        net: the network with folded normalisation; header: its header.
     """
 
     def __init__(self, net: Network, header: Header):
         self.net, self.header = folded(net), header
 
     def estimate(self, *inputs: Tensor) -> Tensor | tuple[Tensor, ...]:
-        """What the network's own `estimate` gives."""
+        """Return the result of the network's own `estimate`."""
         if self._session is None:
             return self.net.estimate(*inputs)
         fed = {name: values.contiguous().numpy() for name, values in zip(self.net.inputs, inputs, strict=True)}
@@ -48,7 +48,8 @@ class Compiled:
 
     @cached_property
     def _session(self) -> onnxruntime.InferenceSession | None:
-        """None: there is no such graph. Made when first asked, with as many threads as torch has then."""
+        """Session of the graph; None without a graph. Created on first use, with torch's number of threads at that
+        time."""
         if not (file := graph_of(self.header)).is_file():
             return None
         options = onnxruntime.SessionOptions()
@@ -62,16 +63,16 @@ class Compiled:
 
 
 def compiled(path: Path, network: type[Network], config: RadarConfig | None = None) -> tuple[Compiled, Header]:
-    """`radarize.learning.nets.weights.load`, as fast as this machine runs it.
+    """Load a network as `radarize.learning.nets.weights.load`, in the fastest form for this machine.
 
     Raises:
-        InputError: as there.
+        InputError: see `load`.
     """
     net, header = load(path, network, config)
     return Compiled(net, header), header
 
 
 def graph_of(header: Header) -> Path:
-    """Where the graph of a network lies, if there is one: by what decides it."""
+    """Return the path of a network's graph, whether it exists or not."""
     shape = json.dumps(header.model_dump(mode="json", include=set(_SHAPE)), sort_keys=True)
     return GRAPHS / f"{header.kind}-{sha256(shape.encode()).hexdigest()[:8]}.onnx"

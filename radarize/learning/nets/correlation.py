@@ -1,9 +1,9 @@
-"""How maps shift against each other: as they would have looked from a step away, what is left between two of them is
-the turn; correlation over azimuth, range by range, between frames of a window.
+"""Shift between maps: after compensation of the translation, the shift over azimuth between two maps is the rotation;
+it is found by correlation over azimuth, range by range, between frames of a window.
 
 The idea is that of FlowNet's correlation layer (Dosovitskiy et al., "FlowNet: learning optical flow with convolutional
-networks", 2015), summed over azimuth: a turn shifts all ranges alike, a step to the side shifts near ones more, and a
-step ahead shifts rows against each other.
+networks", 2015), summed over azimuth: a rotation shifts all ranges equally, a sideways step shifts near ranges more,
+and a forward step shifts rows against each other.
 """
 
 import math
@@ -17,10 +17,10 @@ from radarize.signal.maps import AZIMUTHS, Maps
 
 
 class Moved(nn.Module):
-    """Range-azimuth maps seen from somewhere else with the same heading; what no map saw reads zero.
+    """Range-azimuth maps as seen from another position with the same heading; cells that no map covers are zero.
 
     Args:
-        step: m from row to row.
+        step: step between rows, m.
     """
 
     azimuths: Float[Tensor, "azimuth"]
@@ -33,7 +33,7 @@ class Moved(nn.Module):
     def forward(
         self, maps: Float[Tensor, "item map row azimuth"], travel: Float[Tensor, "item 2"]
     ) -> Float[Tensor, "item map row azimuth"]:
-        """Maps after the sensor has moved by `travel` (forward, left), m."""
+        """Return the maps after the sensor has moved by `travel` (forward, left), m."""
         rows = maps.shape[2]
         ranges = self.step * torch.arange(rows, dtype=maps.dtype, device=maps.device)[:, None]
         ahead = ranges * self.azimuths.cos() + travel[:, 0, None, None]
@@ -45,17 +45,18 @@ class Moved(nn.Module):
 
 
 class Correlation(nn.Module):
-    """Features of every frame by a small convolutional net, correlated between the newest frame and each other one.
+    """Features of each frame from a small convolutional network, correlated between the newest frame and each other
+    one.
 
     Args:
-        maps: of a frame.
-        columns: of a map.
-        features: per cell.
-        turns: columns of azimuth by which frames are shifted against each other, to either side at most.
-        steps: rows of features (four range bins each) likewise.
+        maps: number of maps of a frame.
+        columns: number of columns of a map.
+        features: number of features per cell.
+        turns: maximum shift between frames to either side, in azimuth columns.
+        steps: maximum shift in rows of features (four range bins each).
 
     Attributes:
-        channels: of the image, for every frame but the newest.
+        channels: channels of the image, per frame other than the newest.
     """
 
     spectrum: Float[Tensor, "2 frequency column"]
@@ -70,21 +71,23 @@ class Correlation(nn.Module):
             nn.ReLU(),
             nn.Conv2d(features, features, 5, (2, 1), 2),
         )
-        # Correlation over azimuth as a product of spectra; by matrices, which are small and known to all run times.
-        # On the processor even where only sizes are wanted (see `load`): arithmetic on "meta" imports torch's compiler.
+        # Correlation over azimuth as a product of spectra, computed with small matrices that all runtimes support. They
+        # are created on the CPU even on device "meta" (see `load`), where arithmetic would import torch's compiler.
         with torch.device("cpu"):
             waves = torch.arange(columns + 1) * (math.pi / columns)  # of maps twice as wide: shifts do not wrap
             for name, places in (("spectrum", torch.arange(columns)), ("shift", torch.arange(-turns, turns + 1))):
                 angles = waves[:, None] * places
                 self.register_buffer(name, torch.stack([angles.cos(), -angles.sin()]), persistent=False)
-            both = torch.full((columns + 1, 1), 2.0).index_fill(0, torch.tensor([0, columns]), 1.0)  # frequency's signs
+            both = torch.full((columns + 1, 1), 2.0).index_fill(
+                0, torch.tensor([0, columns]), 1.0
+            )  # both signs of frequency
             self.shift *= both / (2 * columns) / columns**0.5
 
     def forward(self, maps: Maps, reversed_too: bool = False) -> Float[Tensor, "seen channel band shift"]:
-        """Correlation by step in range (channel), range (row, of four bins) and shift in azimuth, of all windows; then,
-        if wanted, of all windows reversed."""
+        """Return correlation by shift in range (channel), range (row, of four bins) and shift in azimuth, of all
+        windows; then, if requested, of all reversed windows."""
         found = self.features(maps.flatten(0, 1))
-        # Only what differs from cell to cell says anything of shifts.
+        # Only differences between cells contain information on shifts.
         found = normalize(found - found.mean(dim=3, keepdim=True), dim=1, eps=0.1)
         real, imaginary = ((found @ part.T).unflatten(0, maps.shape[:2]) for part in self.spectrum)
         if reversed_too:

@@ -1,4 +1,4 @@
-"""Networks as ONNX, for run times other than torch."""
+"""Export of networks as ONNX, for other runtimes than torch."""
 
 import logging
 import warnings
@@ -24,8 +24,8 @@ class Estimate(nn.Module):
 
 
 def export_onnx(net: Network, header: Header, path: Path) -> Path:
-    """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
-    of items, and for turns ``travel`` (item, 2), or what else the network names; outputs ``estimate`` and
+    """Write a network's `estimate` as an ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
+    of items, and for rotation ``travel`` (item, 2), or other inputs of the network; outputs ``estimate`` and
     ``covariance``, or ``probability``.
 
     Raises:
@@ -39,18 +39,18 @@ def export_onnx(net: Network, header: Header, path: Path) -> Path:
 
 
 def export_graph(net: Network, header: Header, path: Path) -> Path:
-    """Write the same without weights, for `compiled`: whoever runs it lends it those of a file."""
+    """Write the graph without weights, for `compiled`, which supplies those of a file."""
     import onnx  # not installed with every radarize
 
     net = folded(net)
-    model = _program(net, header, optimize=False).model_proto  # which would mix weights into constants
+    model = _program(net, header, optimize=False).model_proto  # optimisation would fold weights into constants
     missing = {f"net.{name}" for name in net.state_dict()}
     for values in model.graph.initializer:
         if values.name in missing:
             values.ClearField("raw_data")
             values.data_location = onnx.TensorProto.EXTERNAL
             values.external_data.add(key="location", value="weights")  # no file of that name is read
-    for node in model.graph.node:  # where torch's source lies, and what it calls things
+    for node in model.graph.node:  # paths and names of torch's source
         node.ClearField("metadata_props")
         node.ClearField("doc_string")
     model.graph.ClearField("value_info")
@@ -60,7 +60,7 @@ def export_graph(net: Network, header: Header, path: Path) -> Path:
 
 
 def _program(net: Network, header: Header, optimize: bool = True) -> torch.onnx.ONNXProgram:
-    # torch's exporter lists what it would do with torchvision.
+    # torch's exporter warns that torchvision is missing.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     inputs, item = example(net, header), torch.export.Dim("item")
     with warnings.catch_warnings():

@@ -1,4 +1,5 @@
-"""Networks without norms: these are linear once trained, and become part of the convolutions before them."""
+"""Networks with folded normalisation: a trained batch normalisation is linear and merges with the convolution before
+it."""
 
 from copy import deepcopy
 from itertools import pairwise
@@ -11,7 +12,7 @@ _Net = TypeVar("_Net", bound=nn.Module)
 
 
 def folded(net: _Net) -> _Net:
-    """A copy of a trained network that says the same in two thirds of the time."""
+    """Return a copy of a trained network with equal output in two thirds of the time."""
     net = deepcopy(net).eval()
     for module in net.modules():
         if isinstance(module, nn.Sequential):

@@ -1,4 +1,4 @@
-"""A network's answer with its uncertainty: a normal distribution, trained by its likelihood."""
+"""Network output with uncertainty: a normal distribution, trained by its likelihood."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-#: Logarithms of the standard deviations that a network can claim: 1 mm/s (or mrad) to 50.
+#: Logarithms of the limits of standard deviations: 1 mm/s (or mrad) to 50 m/s (or rad).
 _LEAST, _MOST = math.log(1e-3), math.log(50.0)
 
 
@@ -25,12 +25,12 @@ class Gaussian:
 
     @staticmethod
     def numbers(dimensions: int) -> int:
-        """Numbers that `of` needs an item."""
+        """Return how many numbers per item `of` needs."""
         return dimensions + dimensions * (dimensions + 1) // 2
 
     @classmethod
     def of(cls, numbers: Float[Tensor, "item number"], dimensions: int) -> "Gaussian":
-        """From any numbers: means, logarithms of the factor's diagonal, what is below it."""
+        """Make distributions from unbounded numbers: means, logarithms of the factor's diagonal, entries below it."""
         mean, diagonal, below = numbers.split([dimensions, dimensions, dimensions * (dimensions - 1) // 2], dim=1)
         entries = torch.cat([diagonal.clamp(_LEAST, _MOST).exp(), below], dim=1)
         places = [(k, k) for k in range(dimensions)] + [(i, j) for i in range(dimensions) for j in range(i)]
@@ -44,20 +44,20 @@ class Gaussian:
         return self.factor @ self.factor.mT
 
     def errors_squared(self, truth: Float[Tensor, "item dimension"]) -> Float[Tensor, "item"]:
-        """Squared Mahalanobis distances; of honest distributions their mean is the number of dimensions."""
+        """Return squared Mahalanobis distances; for consistent distributions their mean is the number of dimensions."""
         residual = (truth - self.mean)[..., None]
         return torch.linalg.solve_triangular(self.factor, residual, upper=False).square().sum(dim=(1, 2))
 
     def negative_log_likelihood(
         self, truth: Float[Tensor, "item dimension"], beta: float = 0.0
     ) -> Float[Tensor, "item"]:
-        """Up to its constant.
+        """Return the negative log-likelihood without its constant term.
 
         Args:
             truth: (item, dimension).
-            beta: with 0 the likelihood; with 1 the mean learns as from squared errors. Between, items that the network
-                thinks hard keep a say (Seitzer et al., "On the pitfalls of heteroscedastic uncertainty estimation with
-                probabilistic neural networks", 2022, equation 6).
+            beta: 0: likelihood; 1: the mean is trained as with squared errors. In between, items with large estimated
+                variance keep some weight (Seitzer et al., "On the pitfalls of heteroscedastic uncertainty estimation
+                with probabilistic neural networks", 2022, equation 6).
         """
         log_determinant = self.factor.diagonal(dim1=1, dim2=2).log().sum(dim=1)
         loss = 0.5 * self.errors_squared(truth) + log_determinant

@@ -1,4 +1,4 @@
-"""What training makes small, item by item."""
+"""Loss functions, per item."""
 
 import torch
 from jaxtyping import Float, UInt8
@@ -13,15 +13,15 @@ BETA = 0.5
 
 
 def likelihood(found: Gaussian, truth: Float[Tensor, "item dimension"]) -> Float[Tensor, "item"]:
-    """Of velocities: negative log-likelihood, where the paper has squared errors."""
+    """Loss of velocities: negative log-likelihood, instead of the paper's squared errors."""
     return found.negative_log_likelihood(truth, BETA)
 
 
 def cyclic(both: Gaussian, turn: Float[Tensor, "item 1"]) -> Float[Tensor, "item"]:
-    """Of turns: the way back is the way there, negated (paper, equation 5), by likelihood.
+    """Loss of rotations by likelihood: reversed windows have the negative rotation (paper, equation 5).
 
     Args:
-        both: of twice as many items, windows and then the same windows reversed.
+        both: distributions of windows and then of the same windows reversed.
         turn: rad.
     """
     forth, back = likelihood(both, torch.cat([turn, -turn])).chunk(2)
@@ -29,10 +29,11 @@ def cyclic(both: Gaussian, turn: Float[Tensor, "item 1"]) -> Float[Tensor, "item
 
 
 def surfaces(logits: Float[Tensor, "item range bearing"], label: UInt8[Tensor, "item range bearing"]) -> Tensor:
-    """Of occupancy: cross-entropy in which surfaces, 1 % of the cells, weigh as much as free cells, and Dice.
+    """Loss of occupancy: cross-entropy with equal weight of surfaces, 1 % of the cells, and free cells, plus Dice.
 
-    Cells behind the first surface are unknown and do not count. (The paper's Dice counts them as free; and as published
-    it sums over items and both classes, which makes it 1 - mean probability of the true class: no balance at all.)
+    Cells behind the first surface are unknown and have no weight. The paper's Dice counts them as free, and in the
+    published code it sums over items and both classes, so that it equals 1 - mean probability of the true class and
+    does not balance the classes.
 
     Returns:
         (item,)

@@ -1,8 +1,8 @@
-"""Motion from heat maps: velocity from Doppler over azimuth, turns from range over azimuth (paper, sections 4.2, 4.3).
+"""Motion from heat maps: velocity from Doppler-azimuth, rotation from range-azimuth maps (paper, sections 4.2, 4.3).
 
-Both are ResNet18 on an image made of a window of maps in dB, newest frame last, and answer with a normal distribution.
-`forward` gives what is trained; `estimate` what is used, its covariance scaled by `spread`, which training fits on
-validation data.
+Both networks are a ResNet18 on an image made from a window of maps in dB, newest frame last, and return a normal
+distribution. `forward` is used in training, `estimate` in operation; the latter scales the covariance by `spread`,
+which is fitted to validation data.
 """
 
 import math
@@ -21,15 +21,15 @@ from radarize.signal.maps import AZIMUTHS, Maps
 
 
 class MotionNet(Network):
-    """What the two have in common.
+    """Base class of both networks.
 
     Args:
         frames, maps, width: see `Network`; the width is that of the ResNet.
-        channels: of the image.
+        channels: channels of the image.
 
     Attributes:
         kind, dimensions, stride: set by the subclass; the stride is that of the ResNet's first convolution.
-        spread: logarithm of what standard deviations are multiplied with.
+        spread: logarithm of the factor of standard deviations.
     """
 
     scaled = True
@@ -44,21 +44,22 @@ class MotionNet(Network):
 
 
 class TranslationNet(MotionNet):
-    """Doppler-azimuth maps to the sensor's velocity (forward, left), m/s, in the middle of the newest frame's burst.
+    """Velocity (forward, left), m/s, in the middle of the newest frame's burst, from Doppler-azimuth maps.
 
-    In two looks: the first finds the velocity to a fraction of a Doppler bin. For the second, every column is rolled by
-    what that velocity closes at, so that the static world's ridge lies flat and in the middle, where a second ResNet
-    reads what is missing; it sees the same picture whatever the speed, and needs the fewer examples.
+    It has two stages: the first estimates the velocity to a fraction of a Doppler bin. For the second, each column is
+        shifted
+    by the closing speed for that velocity, so that the ridge of the static world is flat and centred; a second ResNet
+    estimates the remaining velocity. Its input is the same at any speed, so it needs fewer examples.
 
     Args:
         frames, maps, width: see `MotionNet`.
-        step: m/s from row to row.
+        step: step between rows, m/s.
     """
 
     kind, dimensions, stride = "translation", 2, (1, 2)
-    #: m/s; nobody walks faster.
+    #: m/s, maximum speed of a pedestrian.
     fastest = 4.0
-    #: Rows that the second look sees above and below the ridge.
+    #: Rows above and below the ridge that the second stage uses.
     near = 6
     directions: Float[Tensor, "2 column"]
 
@@ -69,7 +70,7 @@ class TranslationNet(MotionNet):
         self.register_buffer("directions", torch.tensor(_directions(), dtype=torch.float32), persistent=False)
 
     def forward(self, maps: Maps) -> Gaussian:
-        """Velocities by the first look at all windows, then by the second: twice as many."""
+        """Return the velocities by the first stage for all windows, then by the second: twice as many."""
         image = level(maps).flatten(1, 2)
         first = self.resnet(torch.cat([image, coordinates(image)], dim=1))
         velocity = first[:, :2].detach().clamp(-self.fastest, self.fastest)
@@ -79,7 +80,7 @@ class TranslationNet(MotionNet):
         return Gaussian.of(torch.cat([first, second]), 2)
 
     def _rolled(self, image: Tensor, velocity: Float[Tensor, "item 2"]) -> Float[Tensor, "item channel near column"]:
-        """Columns rolled so that what closes as a static world does lies in the middle row; linear between rows."""
+        """Shift columns so that closing speeds of a static world are in the middle row; linear between rows."""
         rows = image.shape[2]
         closing = velocity @ self.directions / self.step + rows // 2  # (item, column)
         window = torch.arange(-self.near, self.near + 1, device=image.device)
@@ -91,28 +92,29 @@ class TranslationNet(MotionNet):
         return image.gather(2, lower) * (1 - fraction) + image.gather(2, upper) * fraction
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 2"], Float[Tensor, "item 2 2"]]:
-        """Mean and covariance, by the second look."""
+        """Return mean and covariance, by the second stage."""
         found, count = self(maps), maps.shape[0]
         return found.mean[count:], found.covariance[count:] * (2 * self.spread).exp()
 
 
 def _directions() -> list[list[float]]:
-    """(2, column): forward and left parts of the horizontal directions of a map's columns."""
+    """Return forward and left parts (2, column) of the horizontal directions of a map's columns."""
     return [[math.cos(a) for a in AZIMUTHS], [math.sin(a) for a in AZIMUTHS]]
 
 
 class RotationNet(MotionNet):
-    """Range-azimuth maps to the change of yaw from the oldest frame of the window to the newest, rad, positive to the
-    left.
+    """Change of yaw from the oldest frame of a window to the newest, rad, positive to the left, from range-azimuth
+    maps.
 
-    The paper's network sees the two maps as channels of one image and has to find out by itself that a turn shifts the
-    one against the other, that a step to the side does nearly the same, and how the two differ. Here the step is known
-    from the velocities: both maps are first moved to half way between them (`Moved`), after which a turn shifts all
-    ranges alike. Their correlation (`Correlation`) is the image, in which a turn is a place.
+    In the paper, the two maps are channels of one image, and the network has to learn that a rotation shifts one
+    against the other, that a sideways step has nearly the same effect, and how the two differ. Here the translation is
+    known from the velocities: both maps are first moved to the midpoint (`Moved`), after which a rotation shifts all
+        ranges equally.
+    The image is their correlation (`Correlation`), in which the rotation is a position.
 
     Args:
-        frames, maps, width: as of `TranslationNet`.
-        step: m from row to row.
+        frames, maps, width: see `TranslationNet`.
+        step: step between rows, m.
     """
 
     kind, dimensions, stride = "rotation", 1, (1, 2)
@@ -124,27 +126,29 @@ class RotationNet(MotionNet):
         self.moved, self.correlation = Moved(step), correlation
 
     def forward(self, maps: Maps, travel: Float[Tensor, "item 2"]) -> Gaussian:
-        """Turns of all windows, then of all windows reversed: twice as many.
+        """Return the rotations of all windows, then of all reversed windows: twice as many.
 
         Args:
             maps: in dB.
-            travel: mean of the sensor's velocities at the window's ends times its duration, m (forward, left).
+            travel: translation (forward, left), m: mean of the velocities at the window's ends times its duration.
         """
-        # Frames before the newest lie evenly on the way to it.
+        # Frames before the newest are spaced evenly along the path.
         ago = torch.linspace(0.5, -0.5, self.frames, device=maps.device)
         steps = (travel[:, None] * ago[:, None]).flatten(0, 1)
         moved = self.moved(level(maps).flatten(0, 1), steps).unflatten(0, maps.shape[:2])
         shifts = self.correlation(moved, reversed_too=True)
-        told = torch.cat([travel, -travel])[:, :, None, None].expand(-1, -1, *shifts.shape[2:])
-        image = torch.cat([shifts, told, coordinates(shifts)], dim=1)
+        translation = torch.cat([travel, -travel])[:, :, None, None].expand(-1, -1, *shifts.shape[2:])
+        image = torch.cat([shifts, translation, coordinates(shifts)], dim=1)
         return Gaussian.of(self.resnet(image), self.dimensions)
 
     def estimate(
         self, maps: Maps, travel: Float[Tensor, "item 2"]
     ) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
-        """Mean and covariance of the turn, averaged over the window and its reverse (paper, section 4.3): without the
-        reverse, errors are 4 % larger, which on long walks by hand is much."""
+        """Return mean and covariance of the rotation, averaged over the window and its reverse (paper, section 4.3).
+
+        Without the reverse, errors are 4 % larger, which matters on long handheld walks.
+        """
         both, count = self(maps, travel), maps.shape[0]
         forth, back = both.mean[:count], both.mean[count:]
-        # Both see the same noise: the average is not taken to be better than either.
+        # Both have the same noise, so the average counts as no more accurate than either.
         return (forth - back) / 2, (both.covariance[:count] + both.covariance[count:]) / 2 * (2 * self.spread).exp()

@@ -9,7 +9,7 @@ from torch.nn.functional import relu
 
 
 class Block(nn.Module):
-    """Two convolutions beside a shortcut, over as many axes as told: 3 x 3 over images, 3 over time."""
+    """Residual block of two convolutions, over 1 or 2 axes: 3 over time, 3 x 3 over images."""
 
     def __init__(self, inputs: int, outputs: int, stride: int, axes: int):
         super().__init__()
@@ -18,8 +18,9 @@ class Block(nn.Module):
             convolution(inputs, outputs, 3, stride, 1, bias=False), norm(outputs), nn.ReLU(),
             convolution(outputs, outputs, 3, 1, 1, bias=False), norm(outputs),
         )  # fmt: skip
-        # A 1 x 1 convolution with a stride, of less than 16 channels that lie last, makes oneDNN write past its memory
-        # while it trains (github.com/uxlfoundation/oneDNN/issues/6035): there, every second cell is taken before it.
+        # A strided 1 x 1 convolution of less than 16 channels in channels-last format makes oneDNN write past its
+        # memory in training (github.com/uxlfoundation/oneDNN/issues/6035); in that case every second cell is selected
+        # before it.
         before = stride if inputs < 16 else 1
         self.every: tuple[EllipsisType | slice, ...] = (..., *[slice(None, None, before)] * axes)
         self.shortcut: nn.Module = nn.Identity()
@@ -31,7 +32,8 @@ class Block(nn.Module):
 
 
 def stages(width: int, axes: int = 2) -> nn.Sequential:
-    """Four stages of two blocks: each but the first halves the size and doubles the channels, `width` at first."""
+    """Return four stages of two blocks; each but the first halves the size and doubles the channels, from `width`
+    on."""
     widths = [width, width, 2 * width, 4 * width, 8 * width]
     return nn.Sequential(
         *(
@@ -42,18 +44,18 @@ def stages(width: int, axes: int = 2) -> nn.Sequential:
 
 
 class ResNet18(nn.Module):
-    """Images to numbers.
+    """ResNet18 from images to numbers.
 
     Args:
         inputs: channels of an image.
-        outputs: numbers.
-        width: channels of the first stage; 64 in the original, whose cost falls with the square of it.
-        stride: of the first convolution, rows and columns; 2, 2 in the original.
-        pool: whether the first convolution is followed by a 2 x 2 maximum, as in the original. Heat maps have 40
-            columns where photographs have 224: they bear less shrinking.
+        outputs: number of outputs.
+        width: channels of the first stage; 64 in the original. Cost grows with its square.
+        stride: stride of the first convolution, rows and columns; 2, 2 in the original.
+        pool: whether a 2 x 2 maximum follows the first convolution, as in the original. Heat maps have 40 columns where
+            photographs have 224, so less downsampling is possible.
 
     Attributes:
-        coarse: whether training rounds convolutions to bfloat16, which is up to twice as fast.
+        coarse: whether training uses bfloat16 in convolutions, which is up to twice as fast.
     """
 
     def __init__(self, inputs: int, outputs: int, width: int = 16, stride: tuple[int, int] = (2, 2), pool: bool = True):
@@ -65,7 +67,7 @@ class ResNet18(nn.Module):
         self.head: nn.Module = nn.Linear(8 * width, outputs)
         self.coarse = False
         for module in self.modules():
-            if isinstance(module, nn.Conv2d) and not module.weight.is_meta:  # else only sizes are wanted
+            if isinstance(module, nn.Conv2d) and not module.weight.is_meta:  # weights on "meta" have sizes only
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, x: Float[Tensor, "item channel row column"]) -> Float[Tensor, "item output"]:

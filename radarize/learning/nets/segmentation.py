@@ -1,4 +1,4 @@
-"""Occupancy from heat maps: which cells of range and bearing hold the first surface (paper, section 4.4)."""
+"""Occupancy from heat maps: cells of range and bearing with the first surface (paper, section 4.4)."""
 
 from collections.abc import Sequence
 
@@ -15,14 +15,14 @@ from radarize.signal.maps import AZIMUTHS, Maps
 
 
 def _resampling() -> Tensor:
-    """(azimuth, bearing) weights that take maps to the scan's bearings, linearly."""
+    """Return weights (azimuth, bearing) of the linear interpolation from map azimuths to scan bearings."""
     weights = np.stack([np.interp(BEARINGS, AZIMUTHS, row) for row in np.eye(len(AZIMUTHS))])
     return torch.tensor(weights, dtype=torch.float32)
 
 
 class SegmentationNet(Network):
-    """U-Net on range-azimuth maps, azimuth and elevation-aware, whose answers for the newest frame lie on the grid of
-    the occupancy labels."""
+    """U-Net on range-azimuth maps, azimuth and elevation-aware; its output for the newest frame is on the grid of the
+    occupancy labels."""
 
     kind, outputs = "segmentation", ("probability",)
     resampling: Float[Tensor, "azimuth bearing"]
@@ -33,15 +33,15 @@ class SegmentationNet(Network):
         super().__init__(frames, maps, width)
         self.unet = UNet(frames * len(self.maps) + 2, 1, width)
         self.register_buffer("resampling", _resampling(), persistent=False)
-        # Balanced classes make surfaces seem likelier than they are; training fits these on validation data.
+        # Balanced classes overestimate the probability of surfaces; scale and offset are fitted to validation data.
         self.register_buffer("scale", torch.ones(()))
         self.register_buffer("offset", torch.zeros(()))
 
     def forward(self, maps: Maps) -> Float[Tensor, "item range bearing"]:
-        """Logits of a cell's holding the first surface, given that nothing is before it."""
+        """Return logits of a cell to have the first surface, given that no cell before it has."""
         image = (level(maps) @ self.resampling).flatten(1, 2)
         return self.unet(torch.cat([image, coordinates(image)], dim=1))[:, 0]
 
     def estimate(self, maps: Maps) -> Float[Tensor, "item range bearing"]:
-        """Probability of the same."""
+        """Return the probability of a cell to have the first surface, given that no cell before it has."""
         return torch.sigmoid(self(maps) * self.scale + self.offset)

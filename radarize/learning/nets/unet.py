@@ -9,7 +9,7 @@ from torch.nn.functional import max_pool2d, pad
 
 
 def double_convolution(inputs: int, outputs: int, between: int | None = None) -> nn.Sequential:
-    """Two 3 x 3 convolutions that keep the size, with as many channels between them as after them, unless told."""
+    """Return two 3 x 3 convolutions that keep the size, with `between` channels between them, by default `outputs`."""
     channels = (inputs, between or outputs, outputs)
     layers: list[nn.Module] = []
     for before, after in zip(channels[:-1], channels[1:], strict=True):
@@ -18,11 +18,11 @@ def double_convolution(inputs: int, outputs: int, between: int | None = None) ->
 
 
 class Up(nn.Module):
-    """Twice the size, then the encoder's image of that size beside it.
+    """Upsampling step: doubles the size and joins the encoder's image of that size.
 
     Args:
-        grow: makes the size twice as large.
-        mix: makes one image of both.
+        grow: layer that doubles the size.
+        mix: layer that merges both images.
     """
 
     def __init__(self, grow: nn.Module, mix: nn.Module):
@@ -36,7 +36,7 @@ class Up(nn.Module):
 
 
 def through(x: Tensor, down: Iterable[nn.Module], up: Iterable[nn.Module]) -> Tensor:
-    """An image down the levels, each of half the size, and up again."""
+    """Pass an image through the levels of an encoder, each of half the size, and of a decoder."""
     levels: list[Tensor] = []
     for convolution in down:
         levels.append(convolution(max_pool2d(levels[-1], 2) if levels else x))
@@ -47,7 +47,7 @@ def through(x: Tensor, down: Iterable[nn.Module], up: Iterable[nn.Module]) -> Te
 
 
 class UNet(nn.Module):
-    """Images to images of the same size, of 16 rows and columns at least.
+    """U-Net from images to images of the same size, at least 16 rows and columns.
 
     Args:
         inputs, outputs: channels.

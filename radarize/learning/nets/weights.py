@@ -1,4 +1,4 @@
-"""Trained networks as files: safetensors in float16, with a header that says what they were trained on and for."""
+"""Files of trained networks: safetensors in float16, with a header on their training."""
 
 import json
 import warnings
@@ -26,19 +26,19 @@ from radarize.signal.maps import Maker, MapMaker
 
 
 class Header(Frozen):
-    """What the file says of itself.
+    """Header of a file of weights.
 
     Attributes:
-        kind: of the network.
-        setting: reading of the paper that its maps follow: ``corrected``, or ``published``.
-        frames, maps, width: what the network is built with; maps are names of all that it reads of a frame.
-        grid: of its maps; None if it sees none.
-        spacings: frames from one of the window to the next, as trained.
-        data: name of the data set; split: of it.
-        hours: of walks that it learned from, validation aside; 0 if nobody said.
-        seed, epochs: of the training.
-        metrics: on its validation data.
-        version: of this package.
+        kind: kind of network.
+        setting: variant of the paper's method that its maps follow: ``corrected``, or ``published``.
+        frames, maps, width: parameters of the network; maps are the names of all inputs from a frame.
+        grid: grid of its maps; None without maps.
+        spacings: spacings between frames of a window, in frames, as trained.
+        data: name of the data set; split: its split.
+        hours: duration of the training walks without validation, h; 0 if unknown.
+        seed, epochs: seed and number of epochs of the training.
+        metrics: metrics on its validation data.
+        version: version of this package.
     """
 
     kind: str
@@ -58,16 +58,17 @@ class Header(Frozen):
 
     @property
     def _seen(self) -> MapGrid:
-        assert self.grid is not None  # who asks has a network that sees maps
+        assert self.grid is not None  # only called for networks with maps
         return self.grid
 
     def windows(self, config: RadarConfig, maker: type[Maker], spacings: Sequence[int] | None = None) -> Windows:
-        """Of a radar's frames, as the network was trained on them.
+        """Return windows over a radar's frames, as the network was trained on them.
 
         Args:
-            config: of the radar.
-            maker: of its maps.
-            spacings: some of the network's; the first if None. The radar's that come nearest are taken, each once.
+            config: configuration of the radar.
+            maker: class of its maps.
+            spacings: some of the network's spacings; None: the first. The nearest ones of the radar are used, each
+                once.
         """
         chosen = self.spacings[:1] if spacings is None else spacings
         grid = self._seen
@@ -79,11 +80,11 @@ class Header(Frozen):
         )  # fmt: skip
 
     def ranges(self, config: RadarConfig) -> Float[np.ndarray, "row"]:
-        """Where the rows of a map over range lie that the network sees of a radar, m."""
+        """Return the ranges of the network's map rows for a radar, m."""
         return self._seen.step * np.arange(self._seen.rows) - config.range_bias
 
     def difference(self, config: RadarConfig, maker: type[Maker]) -> str | None:
-        """Why the network cannot be shown a radar's maps, in words; None if it can."""
+        """Return in words why the network cannot process a radar's maps; None if it can."""
         grid, own, period = self._seen, MapGrid.of(config, self.maps[0], maker), config.frame_period
         if not maker.physical:
             share = grid.frame_period / period
@@ -101,28 +102,28 @@ class Header(Frozen):
         return grid.lack(own, "m/s" if maker.axes(config, self.maps[0]).centred else "m")
 
 
-#: Bytes of a file's header: ours have some thousands.
+#: Maximum bytes of a file's header; ours have some thousands.
 _HEADER = 1 << 20
-#: What tells bearings; by how much longer than any that it was trained on a window may be; and how many times as often
-#: as in its training frames may come, which it keeps until a window is full.
+#: Minimum number of antennas in a row; maximum ratio of a window's duration to the longest one in training; maximum
+#: ratio of frame rate to that in training, since frames are stored until a window is complete.
 LEAST_ANTENNAS, LATEST, OFTENEST = 4, 1.6, 32
 
 
 class Network(nn.Module):
-    """What networks have in common; `scaled` ones take the `step` from row to row of their maps as well.
+    """Base class of networks; `scaled` ones also have the parameter `step` between rows of their maps.
 
     Args:
-        frames: of a window, oldest first.
-        maps: names of what it reads of a frame.
+        frames: number of frames of a window, oldest first.
+        maps: names of the inputs from a frame.
         width: channels of the first stage.
 
     Attributes:
         kind: name of its task; setting: see `Header`.
-        maker: of the maps that it sees.
-        scaled: it needs to know how far its maps' rows are apart.
-        inputs, outputs: names of what `estimate` takes and gives.
-        shapes: of an item's inputs, of a network that sees no maps.
-        estimate: what the network is used for; its arguments and answers are the subclass's own.
+        maker: class of its maps.
+        scaled: whether it needs the step between rows of its maps.
+        inputs, outputs: names of inputs and outputs of `estimate`.
+        shapes: shapes of an item's inputs, for a network without maps.
+        estimate: inference; inputs and outputs depend on the subclass.
     """
 
     kind: str
@@ -143,10 +144,10 @@ _Net = TypeVar("_Net", bound=Network)
 
 
 def build(network: type[_Net], header: Header) -> _Net:
-    """An untrained network as a header describes it.
+    """Return an untrained network as described by a header.
 
     Raises:
-        ValueError: it needs to know the grid, and there is none.
+        ValueError: the network needs a grid, and the header has none.
     """
     scale: dict[str, float] = {}
     if network.scaled:
@@ -157,30 +158,32 @@ def build(network: type[_Net], header: Header) -> _Net:
 
 
 def save(net: nn.Module, header: Header, path: Path) -> Path:
-    """Write a network.
+    """Write a network's weights.
 
     Raises:
-        InputError: weights that float16 does not hold, or that the disk does not.
+        InputError: weights exceed the range of float16, or the disk is full.
     """
     halves = {}
     for name, values in net.state_dict().items():
         halves[name] = values.half() if values.is_floating_point() else values
         if not halves[name].isfinite().all():
-            raise InputError(f"{path}: {name} has values that float16 does not hold, expected a network that converged")
+            raise InputError(
+                f"{path}: {name} has values outside the range of float16, expected a network that converged"
+            )
     write(halves, header.model_dump(), path)
     return path
 
 
 def load(path: Path, network: type[_Net], config: RadarConfig | None = None) -> tuple[_Net, Header]:
-    """A network in float32, ready for use.
+    """Load a network in float32.
 
     Args:
         path: file that `save` wrote.
-        network: what it has to be.
-        config: of the radar whose maps it is to read.
+        network: expected class.
+        config: configuration of the radar whose maps are its input.
 
     Raises:
-        InputError: no such file, no weights of this project, another network's, or trained for maps of another grid.
+        InputError: no such file, not weights of this project, another network, or trained for maps of another grid.
     """
     tensors, about = read(path)
     with explained(misfit := f"{path}: its weights do not fit its header", ValidationError):
@@ -191,7 +194,7 @@ def load(path: Path, network: type[_Net], config: RadarConfig | None = None) -> 
             f"({network.setting})"
         )
     with explained(misfit, ValueError, RuntimeError, OverflowError):
-        with torch.device("meta"), warnings.catch_warnings():  # sizes that the header makes up take no memory
+        with torch.device("meta"), warnings.catch_warnings():  # sizes in the header allocate no memory
             warnings.simplefilter("ignore")  # nothing is copied
             build(network, header).load_state_dict(tensors)
         net = build(network, header)
@@ -202,7 +205,7 @@ def load(path: Path, network: type[_Net], config: RadarConfig | None = None) -> 
 
 
 def check(path: Path, config: RadarConfig) -> None:
-    """Whether a network reads the maps of a radar that networks commonly see, by its header alone.
+    """Raise unless a network with standard maps fits a radar, from its header only.
 
     Raises:
         InputError: see `load`.
@@ -211,10 +214,10 @@ def check(path: Path, config: RadarConfig) -> None:
 
 
 def header_of(path: Path) -> Header:
-    """What a file says of itself.
+    """Read the header of a file of weights.
 
     Raises:
-        InputError: no such file, or no weights of this project.
+        InputError: no such file, or not weights of this project.
     """
     with explained(f"{path}: its weights do not fit its header", ValidationError):
         return Header.model_validate(read(path, tensors=False)[1])
@@ -224,32 +227,32 @@ def _check(header: Header, config: RadarConfig, path: Path, maker: type[Maker]) 
     if header.grid is None:
         return
     if header.maps[0] not in maker.maps:
-        raise InputError(f"{path}: reads maps {header.maps[0]!r}, expected some of: {', '.join(maker.maps)}")
+        raise InputError(f"{path}: has input {header.maps[0]!r}, expected some of: {', '.join(maker.maps)}")
     if difference := header.difference(config, maker):
         raise InputError(f"{path}: does not fit this radar, which has {difference}")
 
 
 def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None:
-    """A safetensors file with JSON in its header, whole or not at all.
+    """Write a safetensors file with JSON in its header; the file appears when complete.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     content = {name: values.detach().cpu().contiguous() for name, values in tensors.items()}
     data = serialise(content, {"radarize": json.dumps(about)})
     with replacing(path) as part:
-        part.write_bytes(data)  # safetensors' own writer hides the file from other users
+        part.write_bytes(data)  # safetensors' own writer makes it unreadable for other users
 
 
 def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
-    """What `write` wrote, or its header alone.
+    """Read what `write` wrote, or its header only.
 
     Raises:
-        InputError: no such file, or none of this project.
+        InputError: no such file, or not one of this project.
     """
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file, expected weights (.safetensors)")
-    with explained(f"{path}: is no file of weights of this project"):
+    with explained(f"{path}: is not a file of weights of this project"):
         with Path(path).open("rb") as file:
             if (size := int.from_bytes(file.read(8), "little")) > _HEADER:
                 raise ValueError(f"its header has {size} bytes, expected at most {_HEADER}")
@@ -261,7 +264,7 @@ def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "...
 
 
 def example(net: Network, header: Header) -> tuple[Tensor, ...]:
-    """What a network reads, twice: maps of noise and, if it wants to be told, a travel; or its other readings."""
+    """Return example inputs of a network, two items: maps of noise with a travel if it is an input, or other inputs."""
     noise = torch.Generator().manual_seed(0)
     if header.grid is None:
         return tuple(torch.randn((2, *shape), generator=noise) for shape in net.shapes)

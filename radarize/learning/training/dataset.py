@@ -1,4 +1,4 @@
-"""Recordings as a torch `Dataset`: windows of frames with their truth, read lazily, from any number of processes.
+"""Recordings as a torch `Dataset`: windows of frames with their truth, read on access, from any number of processes.
 
 | field | axes, after those of the window | unit |
 |---|---|---|
@@ -11,10 +11,10 @@
 | scan | bearing, `radarize.signal.bearings.BEARINGS` | m |
 | depth, occupancy | row, column; range cell, azimuth | mm; class |
 
-`FrameDataset.axes` has the numbers. Maps are those that the shipped networks see: what `rz.range_azimuth` and
-`rz.doppler_azimuth` compute, of those azimuths, and of a spectrum that is limited in the case of Doppler, in dB of
-squared ADC counts from -30 on, rounded to a quarter (`radarize.signal.maps`). Networks take them less their own mean
-over 10 (`radarize.learning.nets.maps.level`), so that the receiver's gain drops out.
+`FrameDataset.axes` has the values of axes. Maps are those of the shipped networks: `rz.range_azimuth` and
+`rz.doppler_azimuth` at these azimuths, the latter of an amplitude-limited spectrum, in dB of squared ADC counts, at
+least -30 dB, rounded to 0.25 dB (`radarize.signal.maps`). Networks subtract the mean of each map and divide by 10 dB
+(`radarize.learning.nets.maps.level`), which removes the receiver's gain.
 """
 
 import os
@@ -32,7 +32,7 @@ from radarize.io.recording import Recording
 from radarize.io.tum import planar
 from radarize.signal.maps import MAPS, Axes, MapMaker, maps_of
 
-#: Truth by the name of a field, as the path in the recording and the columns of it.
+#: Truth by field name: path in the recording, and columns.
 TRUTH = {
     "velocity": ("truth/velocity", slice(0, 3)),  # m/s, sensor frame, at the burst's centre
     "pose": ("truth/pose", slice(None)),  # position m, quaternion x y z w
@@ -47,18 +47,18 @@ class FrameDataset(Dataset):
     """Windows of frames of recordings, as dictionaries of tensors.
 
     Args:
-        folder: what `radarsim dataset` wrote, or any folder of recordings, or a recording, or several (all but the
-            first without splits).
-        split: a name of the specification's splits, such as ``random-0``; None for all recordings.
+        folder: folder from `radarsim dataset`, or any folder of recordings, or a recording, or several (splits need the
+            first).
+        split: split in the specification, such as ``random-0``; None for all recordings.
         part: ``train``, ``validation`` or ``test``.
-        fields: of an item, each with the window as its first axis: maps (`radarize.signal.maps.MAPS`, float32, dB),
-            ``adc`` (int16 samples), ``time`` (s, float64), truth (`TRUTH`), and ``turn``: the change of yaw from each
-            frame of the window to the next, rad, positive to the left, one fewer than frames.
-        window: frames of an item.
-        spacing: frames from one frame of a window to the next.
-        stride: frames from one window's start to the next one's.
-        cache: keep maps in memory once they are made, 31 kB a frame and map of 96 x 80 cells, in each worker process
-            (so let them be persistent): made anew of samples, they take some 10 ms a frame.
+        fields: fields of an item, each with the window as first axis: maps (`radarize.signal.maps.MAPS`, float32, dB),
+            ``adc`` (int16 samples), ``time`` (s, float64), truth (`TRUTH`), and ``turn``: change of yaw from each frame
+            of the window to the next, rad, positive to the left, one fewer than frames.
+        window: number of frames of an item.
+        spacing: spacing between frames of a window, in frames.
+        stride: frames between the starts of consecutive windows.
+        cache: keep computed maps in memory, 31 kB per frame and map of 96 x 80 cells, in each worker process (which
+            should be persistent); computing them takes about 10 ms per frame.
 
     Raises:
         InputError: no recordings, an unknown split, part or field, or truth that a recording lacks.
@@ -92,7 +92,7 @@ class FrameDataset(Dataset):
             raise InputError(f"{folder}: no recording has {self._reach} frames, expected enough for a window")
 
     def _count(self, path: Path) -> int:
-        """Windows in a recording, which must have all that is asked for."""
+        """Return the number of windows in a recording; raise if it lacks a requested field."""
         needed = [TRUTH[f][0] for f in self.fields if f in TRUTH] + ["truth/pose"] * ("turn" in self.fields)
         needed += ["radar/adc"] * ("adc" in self.fields)
         with Recording(path) as recording:
@@ -107,7 +107,7 @@ class FrameDataset(Dataset):
 
     @property
     def axes(self) -> dict[str, Axes]:
-        """Rows, step from row to row (m or m/s) and azimuths (rad) of the maps, of the first recording's radar.
+        """Rows, row step (m or m/s) and azimuths (rad) of the maps, for the first recording's radar.
 
         Example:
             >>> rz.torch_dataset("walk.h5", features=["doppler_azimuth"]).axes["doppler_azimuth"].step  # m/s
@@ -146,7 +146,7 @@ class FrameDataset(Dataset):
         return {name: _tensor(item[name], exact=name == "time") for name in self.fields}
 
     def _maps(self, number: int, frames: slice, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Maps of a window of a recording's frames."""
+        """Return the maps of a window of a recording's frames."""
         recording, maker = self._recording(number)
         if not self._cache:
             return maps_of(recording, frames.start, frames.stop, names, maker, self.spacing)
@@ -158,7 +158,7 @@ class FrameDataset(Dataset):
         return {name: np.stack([self._kept[number, frame][name] for frame in wanted]) for name in names}
 
     def _recording(self, number: int) -> tuple[Recording, MapMaker]:
-        """Opened at first use, by every process for itself: HDF5 files do not survive a fork."""
+        """Return a recording, opened by each process on first use, since HDF5 files do not survive a fork."""
         key = os.getpid(), number
         if key not in self._open:
             recording = Recording(self.paths[number])
@@ -170,10 +170,10 @@ class FrameDataset(Dataset):
 
 
 def recordings(folder: str | Path | Sequence[str | Path], split: str | None = None, part: str = "train") -> list[Path]:
-    """Recordings of a folder, or of one part of a split of its specification; or those that are named.
+    """Return the recordings of a folder, or of a part of a split of its specification, or the named ones.
 
     Raises:
-        InputError: none there, no such split or part, or one that has not been made yet.
+        InputError: there are none, no such split or part, or recordings of it are missing.
     """
     if isinstance(folder, str | Path) and Path(folder).suffix == ".h5" and not Path(folder).is_dir():
         folder = [folder]
@@ -209,6 +209,6 @@ def recordings(folder: str | Path | Sequence[str | Path], split: str | None = No
 
 
 def _tensor(values: np.ndarray, exact: bool = False) -> torch.Tensor:
-    """Numbers as float32, but where float64 is needed: stamps of frames differ in the 11th digit."""
+    """Return numbers as float32, except float64 where needed: stamps of frames differ in the 11th digit."""
     values = np.asarray(values)
     return torch.from_numpy(values.astype(np.float32) if values.dtype.kind == "f" and not exact else values)

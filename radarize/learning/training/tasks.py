@@ -1,4 +1,4 @@
-"""The three trainings: which maps, which labels, which loss, and the paper's hyper-parameters (its section 5)."""
+"""Trainings of the three networks: maps, labels, losses, and the paper's hyper-parameters (its section 5)."""
 
 from collections.abc import Iterable
 
@@ -20,7 +20,7 @@ from radarize.signal.maps import Maps
 
 
 class Translation(Motion):
-    """Velocity, m/s."""
+    """Training of velocity, m/s."""
 
     network, truth = TranslationNet, (VELOCITY,)
     error, size = "rmse_m_s", "rms_speed_m_s"
@@ -41,9 +41,10 @@ class Translation(Motion):
 
 
 class Rotation(Motion):
-    """Turn, rad, over up to 0.27 s: the paper's 4 frames of 15 Hz.
+    """Training of rotation, rad, over up to 0.27 s: the paper's 4 frames at 15 Hz.
 
-    Labels are turn and travel; the latter is what the network is told, off by as much as velocities are in use.
+    Labels are rotation and travel; the travel is an input of the network, with errors as large as those of velocities
+    in operation.
     """
 
     network, truth = RotationNet, (YAW, VELOCITY)
@@ -52,11 +53,11 @@ class Rotation(Motion):
     reach = 4 / 15
     least_frames = 2
     defaults = Settings()
-    #: m, standard deviation of the travel that is told.
+    #: m, standard deviation of the error added to the travel.
     doubt = 0.01
 
     def label(self, table: FeatureTable, frames: Tensor) -> Float[Tensor, "item 3"]:
-        """Turn (rad) and travel (m): the mean of the velocities at the window's ends times its duration."""
+        """Return rotation (rad) and travel (m): mean of the velocities at the window's ends times its duration."""
         velocity, first, last = table.truth["velocity"], frames[:, 0], frames[:, -1]
         duration = (last - first)[:, None] * table.frame_period
         return torch.cat([turns(table, frames), duration * (velocity[first] + velocity[last]) / 2], dim=1)
@@ -78,13 +79,13 @@ class Rotation(Motion):
 
 
 class Segmentation(Task[Tensor]):
-    """Occupancy."""
+    """Training of occupancy."""
 
     network: type[Network] = SegmentationNet
     truth = (OCCUPANCY,)
     maps: tuple[str, ...] = ("range_azimuth", "elevation_aware")
     defaults = Settings(frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
-    #: Cells of range by which a first surface may be off to count as found: 9 cm.
+    #: Maximum error in range cells of a first surface that counts as found: 9 cm.
     near = 2
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
@@ -101,7 +102,7 @@ class Segmentation(Task[Tensor]):
         return self._judged(losses.surfaces(logits, label), logits > 0, label == SURFACE)
 
     def _judged(self, loss: Tensor, occupied: Tensor, surface: Tensor) -> Float[Tensor, "item 3"]:
-        """Loss, first surfaces that are found nearly where they are, and first surfaces."""
+        """Return loss, number of first surfaces found near their true range, and number of first surfaces."""
         found, truth = first_cell(occupied), first_cell(surface)
         there = truth < surface.shape[1]
         near = ((found - truth).abs() <= self.near) & there
@@ -112,7 +113,7 @@ class Segmentation(Task[Tensor]):
         return {"loss": loss, "share_found_within_9_cm": near / max(there, 1e-9)}
 
     def calibrate(self, net: Network, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """By plain likelihood: multiplied along a bearing, cells' probabilities are that of its first surface."""
+        """Calibrate by likelihood: the product of cell probabilities along a bearing is that of its first surface."""
         pairs = [(net(maps)[:, :, ::4], label[:, :, ::4]) for maps, label in batches]
         known = [label != UNKNOWN for _, label in pairs]
         logits = torch.cat([found[k] for (found, _), k in zip(pairs, known, strict=True)]).detach()

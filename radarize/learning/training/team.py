@@ -1,4 +1,4 @@
-"""Processes that train one network together, as torch's launcher starts them (`torchrun`), or one alone."""
+"""Processes that train one network together, started by torch's launcher (`torchrun`), or a single one."""
 
 import os
 from collections.abc import Iterator
@@ -15,12 +15,12 @@ from radarize.io.errors import InputError
 
 @dataclass(frozen=True)
 class Team:
-    """One process's place among them.
+    """A process among those that train together.
 
     Attributes:
-        rank: 0...size - 1; 0 reports and writes.
-        size: processes.
-        device: this one's.
+        rank: 0 to size - 1; rank 0 reports and writes.
+        size: number of processes.
+        device: device of this process.
     """
 
     rank: int
@@ -28,13 +28,14 @@ class Team:
     device: torch.device
 
     def share(self, net: nn.Module) -> nn.Module:
-        """The network with gradients averaged over all processes."""
+        """Return the network with gradients averaged over all processes."""
         if self.size == 1:
             return net
         return DistributedDataParallel(net, device_ids=[self.device] if self.device.type == "cuda" else None)
 
     def agree(self, net: nn.Module) -> None:
-        """Give all processes the first one's statistics of batch normalisation, of which each has its own."""
+        """Copy the statistics of batch normalisation, which each process has its own of, from the first process to
+        all."""
         if self.size > 1:
             for values in net.buffers():
                 dist.broadcast(values, 0)
@@ -47,20 +48,20 @@ class Team:
         return values.cpu()
 
     def wait(self) -> None:
-        """Until all are here."""
+        """Wait until all processes get here."""
         if self.size > 1:
             dist.barrier()
 
 
 @contextmanager
 def team(device: str | None = None) -> Iterator[Team]:
-    """Join the processes that `torchrun` started, if it did.
+    """Join the processes started by `torchrun`, if any.
 
     Args:
-        device: ``cpu`` or ``cuda``; a GPU where there is one if None.
+        device: ``cpu`` or ``cuda``; None: a GPU if available.
 
     Raises:
-        InputError: a GPU is asked for and missing, or fewer of them than processes.
+        InputError: a GPU is requested and missing, or there are fewer GPUs than processes.
     """
     rank, size = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
     local = int(os.environ.get("LOCAL_RANK", 0))

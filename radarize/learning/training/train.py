@@ -1,4 +1,4 @@
-"""`radarize train`: from a folder of recordings to a file of weights."""
+"""Training from a folder of recordings to a file of weights, as `radarize train` does."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,22 +19,22 @@ from radarize.learning.training.dataset import recordings
 from radarize.learning.training.team import team
 from radarize.learning.training.trainer import Trainer
 
-#: Without a split, every so manieth recording validates.
+#: Without a split, every N-th recording is used for validation.
 _TENTH = 10
 
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """How a training is run.
+    """Options of a training run.
 
     Attributes:
-        split: of the data set; every tenth recording validates if None.
-        device: ``cpu`` or ``cuda``; a GPU where there is one if None.
-        workers: processes that read.
-        resume: go on from the checkpoint, if there is one.
-        start: weights to begin with, of a network of the same task, instead of random ones: width, frames and grid are
-            its own, and recordings may be of any radars.
-        onnx: write the network as ONNX as well.
+        split: split of the data set; None: every 10th recording is used for validation.
+        device: ``cpu`` or ``cuda``; None: a GPU if available.
+        workers: number of processes that read.
+        resume: continue from the checkpoint, if there is one.
+        start: initial weights, of a network of the same task, instead of random ones; they determine width, frames and
+            grid, and recordings may come from any radars.
+        onnx: also write the network as ONNX.
     """
 
     split: str | None = None
@@ -53,23 +53,23 @@ def train(
     options: TrainOptions | None = None,
     *,
     progress: Callable[..., None] = lambda *where: None,
-    say: Callable[[str], None] = lambda line: None,
+    log: Callable[[str], None] = lambda line: None,
 ) -> Path:
-    """Train a network on recordings, alone or as one of the processes that `torchrun` started.
+    """Train a network on recordings, in a single process or in one of those that `torchrun` started.
 
     Args:
         kind: a key of `radarize.learning.task.TASKS`.
         data: folder of recordings, of samples or of maps.
-        output: weights to write (.safetensors). The log is beside it (.csv), and so is the checkpoint of the last
+        output: weights to write (.safetensors). The log (.csv) is written beside it, and the checkpoint of the last
             epoch (.checkpoint) until training has ended.
-        settings: hyper-parameters; the task's own if None.
-        options: how it is run.
+        settings: hyper-parameters; None: those of the task.
+        options: options of the run.
         progress: called with (stage, done, in all).
-        say: takes a line for every epoch.
+        log: called with a line for every epoch.
 
     Raises:
-        InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
-            is no number.
+        InputError: unusable data or settings, an existing checkpoint without `resume` or of other settings, or a loss
+            that is not finite.
     """
     task, output, data, options = find_task(kind), Path(output), Path(data), options or TrainOptions()
     settings = settings or task.defaults
@@ -77,31 +77,33 @@ def train(
     if before is not None:
         settings = replace(settings, width=before.width, frames=before.frames)
     _check(task, settings, output)
-    checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
+    checkpoint, log_file = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
     if checkpoint.exists() and not options.resume:
-        raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
+        raise InputError(
+            f"{checkpoint}: belongs to an interrupted training; continue it with --resume, or remove the file"
+        )
     network = task.network
     about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": options.split}
     if before is not None and options.start is not None:
         about |= {"start": options.start.name, "data": f"{before.data}, then {about['data']}"}
     with team(options.device) as crew:
         lead = crew.rank == 0
-        progress, say = (progress, say) if lead else (_nothing, _nothing)
+        progress, log = (progress, log) if lead else (_nothing, _nothing)
         parts = _read(task, data, options, settings.seed, progress, before.grid if before else None)
         trainer = Trainer(task, settings, *parts, crew)
         if begun is not None:
             trainer.net.load_state_dict(begun.state_dict())
         if options.resume and checkpoint.exists():
             trainer.restore(checkpoint, about)
-            say(f"resuming after epoch {len(trainer.history)}")
-        crew.wait()  # before the first one replaces what the others read
+            log(f"resuming after epoch {len(trainer.history)}")
+        crew.wait()  # until all have read the checkpoint, which rank 0 replaces
         while not trainer.finished:
             found = trainer.train_epoch(partial(progress, "training"))
             if lead:
                 trainer.save(checkpoint, about)
-                with replacing(log) as part:
+                with replacing(log_file) as part:
                     pd.DataFrame(trainer.history).to_csv(part, index=False)
-                say(_words(found))
+                log(_words(found))
         if lead:
             metrics = trainer.finish()
             header = task.header(
@@ -114,7 +116,7 @@ def train(
             if options.onnx:
                 export_onnx(trainer.net, header, output.with_suffix(".onnx"))
             checkpoint.unlink(missing_ok=True)
-            say("calibrated: " + _words(metrics))
+            log("calibrated: " + _words(metrics))
         crew.wait()
     return output
 
@@ -130,11 +132,11 @@ def _nothing(*where: object) -> None:
 def _read(
     task: Task, data: Path, options: TrainOptions, seed: int, progress: Callable[..., None], grid: MapGrid | None
 ) -> tuple[FeatureTable, FeatureTable]:
-    """Training and validation data, on a grid if there is one."""
+    """Read training and validation data, resampled to a grid if given."""
     if options.split is None:
         found = recordings(data)
         if len(found) < 2:
-            raise InputError(f"{data}: holds one recording, expected at least two, one of which validates")
+            raise InputError(f"{data}: has one recording, expected at least two, one of them for validation")
         apart = set(np.random.default_rng(seed).permutation(len(found))[: max(1, len(found) // _TENTH)])
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
@@ -147,11 +149,13 @@ def _check(task: Task, settings: Settings, output: Path) -> None:
         if not (value := getattr(settings, name)) > 0:
             raise InputError(f"{name} is {value}, expected a positive number")
     if settings.frames < task.least_frames:
-        raise InputError(f"frames is {settings.frames}, expected at least {task.least_frames} to move between")
+        raise InputError(
+            f"frames is {settings.frames}, expected at least {task.least_frames} for a motion between them"
+        )
     for name, known in (("schedule", ("plateau", "cosine", "steps")), ("precision", ("float32", "bfloat16"))):
         if (value := getattr(settings, name)) not in known:
             raise InputError(f"{name} is {value!r}, expected one of: {', '.join(known)}")
     if settings.seed < 0:
-        raise InputError(f"seed is {settings.seed}, expected no negative number")
+        raise InputError(f"seed is {settings.seed}, expected a number of at least 0")
     if output.is_dir() or output.suffix != ".safetensors":
         raise InputError(f"output is {output}, expected a file NAME.safetensors")

@@ -1,7 +1,7 @@
-"""The training loop: an epoch, its validation, a checkpoint, and again until it gets no better.
+"""Training loop: an epoch, its validation, a checkpoint, repeated until the validation loss no longer decreases.
 
-Everything random follows from the seed and the numbers of epoch and step, so that a training that was killed goes on
-from its checkpoint as if nothing had happened: bit for bit on processors; GPUs add up in changing orders.
+All random numbers follow from the seed, the epoch and the step, so that an interrupted training continues from its
+checkpoint with the same result: bit for bit on CPUs, while GPUs add in varying order.
 """
 
 import math
@@ -26,7 +26,7 @@ from radarize.learning.training.team import Team
 
 #: Share of a cosine schedule in which the rate rises.
 _WARM = 0.05
-#: What the rate of a schedule of steps falls to each time, and how many epochs a step lasts.
+#: Factor of the rate per step of a step schedule, and epochs per step.
 _DROP, _LASTS = 0.75, 25
 
 
@@ -35,8 +35,8 @@ class Trainer:
 
     Attributes:
         net: the network.
-        history: of each epoch so far, what the log says.
-        best: of the epoch with the least validation loss, that loss and the weights.
+        history: log entries of all epochs so far.
+        best: least validation loss so far, and the weights of that epoch.
 
     Raises:
         InputError: too few frames.
@@ -74,12 +74,12 @@ class Trainer:
 
     @property
     def steps(self) -> int:
-        """Of an epoch."""
+        """Number of steps of an epoch."""
         return max(1, int(self.task.share * len(self._starts)) // self.settings.batch)
 
     @property
     def finished(self) -> bool:
-        """Whether all epochs are done, or the last ones made nothing better."""
+        """Whether all epochs are done, or the validation loss has not decreased for `patience` epochs."""
         done = len(self.history)
         losses = [epoch["loss"] for epoch in self.history]
         return done >= self.settings.epochs or (
@@ -87,13 +87,13 @@ class Trainer:
         )
 
     def train_epoch(self, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, float]:
-        """One pass over the training data, then over the validation data.
+        """Train one epoch, then validate.
 
         Args:
-            progress: called with (steps done, steps in all), of all epochs.
+            progress: called with (steps done, steps in all), over all epochs.
 
         Raises:
-            InputError: the loss is no number any more.
+            InputError: the loss is not finite.
         """
         began, epoch, settings = time.monotonic(), len(self.history), self.settings
         order, spacings = self._order(epoch)
@@ -133,8 +133,8 @@ class Trainer:
         return self.history[-1]
 
     def _warm_or_cool(self, step: int) -> None:
-        """The rate at a step of all, by a schedule that knows it beforehand: cosine (Loshchilov and Hutter, "SGDR",
-        2017, without restarts), or steps."""
+        """Set the rate of a step, for schedules by step: cosine (Loshchilov and Hutter, "SGDR", 2017, without
+        restarts), or steps."""
         if self.settings.schedule == "plateau":
             return
         total = self.settings.epochs * self.steps
@@ -147,20 +147,20 @@ class Trainer:
 
     @torch.no_grad()
     def validate(self) -> dict[str, float]:
-        """Metrics on the validation data, by the network's present weights."""
+        """Return metrics on the validation data with the current weights."""
         self.net.eval()
         return self.task.metrics(self.team.sum(self._judged(self.team.rank, self.team.size)) / len(self._validated))
 
     @torch.no_grad()
     def finish(self) -> dict[str, float]:
-        """Take the best weights, calibrate them, and say how they do. For the first process alone."""
+        """Load the best weights, calibrate them, and return their metrics. Only for rank 0."""
         self.net.load_state_dict(self.best[1])
         self.net.eval()
         self.task.calibrate(self.net, self._validation(0, 1))
         return self.task.metrics(self._judged(0, 1).cpu() / len(self._validated))
 
     def _judged(self, rank: int, size: int) -> Float[Tensor, "number"]:
-        """Sums of what the task says of validation items, of which each process takes some."""
+        """Return sums of the task's evaluation of validation items; each process evaluates a part of them."""
         judged = (self.task.judge(self.net, *batch).double().sum(dim=0) for batch in self._validation(rank, size))
         return sum(judged, start=torch.zeros(()))
 
@@ -168,8 +168,8 @@ class Trainer:
         """Write a checkpoint.
 
         Args:
-            path: file, replaced at once.
-            about: what `restore` has to find again.
+            path: file, replaced as a whole.
+            about: properties that `restore` compares.
         """
         state = self._optimiser.state_dict()
         tensors = {f"net/{name}": values for name, values in self.net.state_dict().items()}
@@ -185,10 +185,10 @@ class Trainer:
         weights.write(tensors, {**about, "settings": asdict(self.settings), "progress": progress}, path)
 
     def restore(self, path: Path, about: dict) -> None:
-        """Go on from a checkpoint.
+        """Continue from a checkpoint.
 
         Raises:
-            InputError: it is unreadable, or of another training: only the number of epochs and the patience may change.
+            InputError: unreadable, or of another training: only number of epochs and patience may differ.
         """
         tensors, found = weights.read(path)
         flexible = ("patience",) if self.settings.schedule == "cosine" else ("epochs", "patience")
@@ -197,7 +197,7 @@ class Trainer:
             other = {**found, **found.get("settings", {})}.get(name)
             if (list(value) if isinstance(value, tuple) else value) != other:
                 raise InputError(
-                    f"{path}: is of a training with {name} {other!r}, expected {value!r}; drop --resume, or it"
+                    f"{path}: is of a training with {name} {other!r}, expected {value!r}; omit --resume or remove it"
                 )
         progress = found["progress"]
         best: dict[str, Tensor] = {}
@@ -217,7 +217,7 @@ class Trainer:
         self.history = progress["history"]
 
     def _order(self, epoch: int) -> tuple[Tensor, Tensor]:
-        """Windows of an epoch and their spacings, the same for all processes."""
+        """Return windows of an epoch and their spacings, the same for all processes."""
         rng = np.random.default_rng((self.settings.seed, epoch))
         order = self._starts[torch.from_numpy(rng.permutation(len(self._starts)))]
         return order, torch.from_numpy(rng.choice(np.asarray(self.spacings), len(order)))

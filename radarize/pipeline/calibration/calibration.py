@@ -1,4 +1,4 @@
-"""A radar's calibration from an ordinary walk, or by a corner reflector, and the board's file that it makes."""
+"""Calibration of a radar from an ordinary walk or from a corner reflector, and the board file that stores it."""
 
 from collections.abc import Callable
 from copy import copy
@@ -26,20 +26,20 @@ from radarize.radar.boards import BOARDS, SUFFIXES, Board, Mounting, load_board
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig, firing_name
 
-#: Frames that are used at most: a minute at 30 frames/s, for which all is solved at once.
+#: Maximum number of frames: a minute at 30 frames/s, solved in one system of equations.
 _LONGEST = 1800
-#: Of a walk at least: frames that determine a velocity, and way, m. From here on a warning: way, m; turns, rad.
+#: Minimum of a walk: frames with a velocity, and path length, m. Limits for a warning: path length, m; turns, rad.
 _FRAMES, _WAY, _SHORT, _FEW_TURNS = 60, 1.0, 8.0, np.radians(90.0)
-#: Standard errors from which on a warning is due: phases, rad RMS; gains, dB RMS; range bias, m.
+#: Standard errors above which a warning is given: phases, rad RMS; gains, dB RMS; range bias, m.
 _PHASE, _GAIN, _BIAS = np.radians(2.0), 0.3, 0.02
-#: The scale of the azimuth is taken from this on, and so many standard errors: antennas stand where the board's file
-#: says.
+#: The scale of azimuth is applied if it differs from 1 by this much and by this number of standard errors; below that
+#: the antenna positions of the board file are kept.
 _SCALE, _SURE = 0.01, 4.0
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a recording shows of its radar.
+    """Calibration of a radar, estimated from a recording.
 
     Attributes:
         config: the radar's, calibrated.
@@ -68,19 +68,19 @@ class Calibration:
 
     @property
     def gains(self) -> Float[np.ndarray, "tx rx"]:
-        """Gains of the enabled channels, dB about their mean."""
+        """Gains of the enabled channels, dB relative to their mean."""
         levels = -20 * np.log10(np.abs(self.config.calibration))
         return levels - levels.mean()
 
     @property
     def phases(self) -> Float[np.ndarray, "tx rx"]:
-        """Phases of the enabled channels, rad about their mean; the board's nominal signs are taken off."""
+        """Phases of the enabled channels, rad relative to their mean, without the nominal signs of the board."""
         signs = self.board.signs[self.config.channels]
         return -centred((self.config.calibration * signs).ravel()).reshape(self.config.calibration.shape)
 
     @property
     def tables(self) -> list[tuple[tuple[str, ...], list[tuple[object, ...]], tuple[int, ...]]]:
-        """Channels, and the rest, for `radarize.io.console.print_table`."""
+        """Tables of the channels and of the other quantities, for `radarize.io.console.print_table`."""
         gain, phase = np.moveaxis(self.errors, -1, 0)
         channels: list[tuple[object, ...]] = [
             (
@@ -100,14 +100,14 @@ class Calibration:
         ]
 
     def save(self, path: str | Path) -> Path:
-        """Write a board's file (``.yaml``), or a ``.cfg`` with ``compRangeBiasAndRxChanPhase``.
+        """Write a board file (``.yaml``), or a ``.cfg`` with ``compRangeBiasAndRxChanPhase``.
 
         Raises:
             InputError: another suffix, or it cannot be written.
         """
         path = Path(path)
         if path.suffix == ".cfg":
-            # The firmware's factors are 16-bit fractions: none may exceed 1.
+            # The firmware's factors are 16-bit fractions with magnitude up to 1.
             factors = self.config.channel_factors / np.abs(self.config.channel_factors).max()
             plain = self.board.model_copy(update=_UNMEASURED)
             known = plain.name if BOARDS.get(plain.name) == plain else plain
@@ -123,7 +123,7 @@ class Calibration:
                 fields, sort_keys=False, default_flow_style=None, width=120
             )
         else:
-            raise InputError(f"--output is {path}, expected a board's file (.yaml) or a radar's configuration (.cfg)")
+            raise InputError(f"--output is {path}, expected a board file (.yaml) or a radar configuration (.cfg)")
         with replacing(path) as part:
             part.write_text(text, encoding="utf-8")
         return path
@@ -139,25 +139,26 @@ def calibrate(
     target: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Calibration:
-    """Calibrate a radar: gains and phases of its channels, range bias, azimuth scale, and how the sensor is mounted.
+    """Calibrate gains and phases of the channels, range bias, azimuth scale, and mounting of a radar.
 
-    From an ordinary walk of about 20 s, without a reflector: in a static world each echo's closing speed says in which
-    direction it lies, and how that direction changes while the sensor passes by says how far away it is. Or from a
-    corner reflector straight ahead of a radar that stands still, as TI's demo does it.
+    Without `target`, the calibration uses an ordinary walk of about 20 s and no reflector: in a static world the
+        closing
+    speed of an echo determines its direction, and the change of that direction as the sensor passes determines its
+    distance. With `target`, it uses a corner reflector straight ahead of a radar that stands still, as TI's demo does.
 
     Args:
-        recording: a recording or a file, or a part of one, of which the first 1800 frames are used. What it holds of
-            an earlier calibration is not used.
-        output: board's file to write (``board.yaml``, for ``--board``), or ``radar.cfg``.
-        target: distance of a corner reflector, m, straight ahead; None: a walk.
+        recording: a recording or a file, or a part of one, of which the first 1800 frames are used. Existing
+            calibration in it is ignored.
+        output: board file to write (``board.yaml``, for ``--board``), or ``radar.cfg``.
+        target: distance of a corner reflector straight ahead, m; None: a walk.
         progress: called with (frames done, frames in all).
 
     Returns:
-        ``.config`` and ``.board``, calibrated; ``.gains`` (dB) and ``.phases`` (rad) of the channels and their standard
-        ``.errors``; ``.values`` of the rest; ``.warnings``; ``.save(path)``.
+        ``.config`` and ``.board`` with the calibration; ``.gains`` (dB) and ``.phases`` (rad) of the channels and their
+        standard ``.errors``; ``.values`` of the other quantities; ``.warnings``; ``.save(path)``.
 
     Raises:
-        InputError: samples are missing, the sensor hardly moves (or, with a target, does), or nothing echoes.
+        InputError: samples are missing, the sensor hardly moves (with a target: moves), or there are no echoes.
 
     Example:
         >>> rz.calibrate(rec)
@@ -175,7 +176,7 @@ def calibrate(
 
 
 def recalibrated(frames: Clip, config: RadarConfig) -> Clip:
-    """The frames as if another configuration of the same radar had been recorded with them."""
+    """Return the frames as if they had been recorded with another configuration of the same radar."""
     recording = copy(frames.recording)
     recording.config = config
     return Clip(recording, frames.numbers, frames.alone)
@@ -193,7 +194,9 @@ def _walk(frames: Clip, progress: Callable[[int, int], None]) -> Calibration:
     config, path, period = uncalibrated(frames.config), frames.recording.path, frames.config.frame_period
     array = Array(config)
     if 0 not in array.axes:
-        raise InputError(f"{path}: has {len(array.positions)} channel(s) without a row, expected antennas side by side")
+        raise InputError(
+            f"{path}: has {len(array.positions)} channel(s) and no row of antennas, expected antennas side by side"
+        )
     cells = cells_of(frames, progress)
     expected = "expected a walk of about 20 s past walls and furniture"
     if len(cells) < 10 * _FRAMES:
@@ -203,7 +206,7 @@ def _walk(frames: Clip, progress: Callable[[int, int], None]) -> Calibration:
     motion = solve(cells, channels.waves, array, config, int(cells.frame[-1]) + 1)
     seen, way = int(motion.seen.sum()), float(np.hypot(*motion.velocity[motion.seen, :2].T).sum() * period)
     if seen < _FRAMES or way < _WAY:
-        raise InputError(f"{path}: shows {way:.1f} m of motion in {seen} of {len(frames)} frames, {expected}")
+        raise InputError(f"{path}: has {way:.1f} m of motion in {seen} of {len(frames)} frames, {expected}")
     factors = channels.factors * array.wave(motion.values[None, :2])[0]
     bias, yaw = _range_bias(frames, _calibrated(config, factors, {}, None), cells, channels.waves, motion)
     if 1 in array.axes:
@@ -218,24 +221,24 @@ def _walk(frames: Clip, progress: Callable[[int, int], None]) -> Calibration:
         "height": floor, "tilt": tilt, "lean": lean, "yaw": ahead, "lever_arm": lever,
     }  # fmt: skip
     config = _calibrated(config, factors, values, motion)
-    # What the shifts' errors add to the phases along the array.
+    # Contribution of the errors of the shifts to the phases along the array.
     along = 2 * np.pi * (array.positions - array.positions.mean(axis=0)) * motion.error[[SHIFT_LEFT, SHIFT_UP]]
     error = channels.error.copy()
     error[:, 1] = np.sqrt(error[:, 1] ** 2 + (along**2).sum(axis=1))
     turned = float(np.ptp(yaw))
-    warnings = [f"the walk is short: {way:.1f} m, better {_SHORT:g} m or more"] if way < _SHORT else []
-    warnings += [f"the walk turns by {np.degrees(turned):.0f} deg, better by 90 deg"] if turned < _FEW_TURNS else []
+    warnings = [f"the walk is short: {way:.1f} m, expected {_SHORT:g} m or more"] if way < _SHORT else []
+    warnings += [f"the walk turns by {np.degrees(turned):.0f} deg, expected 90 deg"] if turned < _FEW_TURNS else []
     source = f"{path.name}: walk of {way:.1f} m, {seen} frames with velocity, {bias.tracks} points with parallax"
     return _judged(Calibration(config, _by_channel(error, config), values, warnings, source))
 
 
-_NO_PARALLAX = "no point was passed by that shows a parallax"
+_NO_PARALLAX = "no point has an observable parallax"
 
 
 def _range_bias(
     frames: Clip, config: RadarConfig, cells: Cells, waves: Waves, motion: EgoMotion
 ) -> tuple[RangeBias, Float[np.ndarray, "frame"]]:
-    """The bias, and headings at the frames: odometry's, whose map is blurred by a bias, so it is asked twice."""
+    """Return the range bias and the heading at each frame. A bias blurs the map of odometry, so odometry runs twice."""
     period = config.frame_period
     times = cells.time[0] + period * np.arange(len(motion.velocity))
     for _ in range(2):
@@ -253,7 +256,7 @@ def _range_bias(
 def _calibrated(
     config: RadarConfig, factors: Complex[np.ndarray, "antenna"], values: dict[str, Estimate], motion: EgoMotion | None
 ) -> RadarConfig:
-    """The radar with a board that was measured."""
+    """Return the configuration with a measured board."""
     board = load_board(config.board)
     whole = np.array([complex(*pair) for pair in board.nominal_calibration]).reshape(board.signs.shape)
     measured = 1 / factors * np.exp(1j * np.angle(factors.sum()))
@@ -280,21 +283,23 @@ def _by_channel(error: np.ndarray, config: RadarConfig) -> Float[np.ndarray, "tx
 
 
 def _judged(found: Calibration) -> Calibration:
-    """With warnings of large standard errors."""
+    """Return the calibration with warnings about large standard errors."""
     gain, phase = np.sqrt(np.square(found.errors).mean(axis=(0, 1)))
-    bias, told = found.values["range_bias"], list(found.warnings)
+    bias, warnings = found.values["range_bias"], list(found.warnings)
     if phase > _PHASE:
-        told.append(f"phases are known within {np.degrees(phase):.1f} deg only: walk longer, past more things")
+        warnings.append(f"phases have a standard error of {np.degrees(phase):.1f} deg: walk longer, past more objects")
     if gain > _GAIN:
-        told.append(f"gains are known within {gain:.2f} dB only: walk longer, past more things")
+        warnings.append(f"gains have a standard error of {gain:.2f} dB: walk longer, past more objects")
     if bias.why:
-        told.append(f"the range bias was not observable ({bias.why}) and is taken for 0 m")
+        warnings.append(f"the range bias is not observable ({bias.why}) and set to 0 m")
     elif bias.error > _BIAS:
-        told.append(f"the range bias is known within {bias.error:.3f} m only: pass by more furniture, at 1 to 3 m")
-    return replace(found, warnings=told)
+        warnings.append(
+            f"the range bias has a standard error of {bias.error:.3f} m: pass more furniture at a distance of 1 to 3 m"
+        )
+    return replace(found, warnings=warnings)
 
 
-#: Units of the further values in tables and files, and by what SI values are multiplied.
+#: Units of the other quantities in tables and files, and factors from SI units to them.
 _UNITS = {
     "range_bias": ("m", 1.0), "azimuth_scale": ("", 1.0), "height": ("m", 1.0), "lever_arm": ("m", 1.0),
     **dict.fromkeys(("tilt", "lean", "yaw"), ("deg", 180 / np.pi)),
@@ -302,7 +307,7 @@ _UNITS = {
 
 
 def _shown(name: str, each: Estimate) -> tuple[str, str]:
-    """Value with its standard error, and unit; or why there is none."""
+    """Return value with standard error, and unit; or why it is not observable."""
     unit, factor = _UNITS[name]
     return (
         ("not observable", each.why) if each.why else (f"{factor * each.value:.3f} +- {factor * each.error:.3f}", unit)

@@ -1,5 +1,6 @@
-"""Echoes of a walk as the antennas see them: the peaks of each frame's range-Doppler map, a snapshot of all virtual
-antennas each. The channels' errors are left in, so that whoever calibrates or checks a board finds them there.
+"""Echoes of a walk: the peaks of each frame's range-Doppler map, each with a snapshot of all virtual antennas.
+
+The channel errors are not corrected, since calibrating or checking a board measures them.
 """
 
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Batch, Preprocessor, Signal
 from radarize.signal.effort import together
 
-#: Peaks count whose power is so many times the median cell's; the strongest of a frame; from this range on, m, beyond
+#: Minimum ratio of a peak's power to the median cell's; maximum number of peaks per frame; minimum range, m, beyond
 #: leakage and mount.
 _THRESHOLD, _MOST, _NEAREST = 30.0, 120, 0.45
 
@@ -25,13 +26,13 @@ class Cells:
     """Peaks of range-Doppler maps.
 
     Attributes:
-        frame: (cell,) number of the frame, ascending; of every N-th frame, counted in these.
+        frame: (cell,) frame number, ascending; if every N-th frame is used, counted in these.
         time: (cell,) burst centre of the frame, s.
-        range: (cell,) m, between bins, as measured: a range bias is still in it.
-        speed: (cell,) closing speed between bins, m/s.
-        power: (cell,) over the median cell of the frame.
-        snapshot: (cell, antenna) amplitudes of the virtual antennas, flat (tx, rx), as if all had been sampled at once;
-            the signs of the board's receivers are taken off, nothing else.
+        range: (cell,) range, interpolated between bins, m; includes a range bias.
+        speed: (cell,) closing speed, interpolated between bins, m/s.
+        power: (cell,) ratio to the power of the frame's median cell.
+        snapshot: (cell, antenna) amplitudes of the virtual antennas, flat (tx, rx), as if sampled at the same time;
+            corrected for the signs of the board's receivers only.
     """
 
     frame: Int[np.ndarray, "cell"]
@@ -45,17 +46,17 @@ class Cells:
         return len(self.frame)
 
     def where(self, chosen: Bool[np.ndarray, "cell"] | Int[np.ndarray, "cell"]) -> "Cells":
-        """Some of the cells."""
+        """Return some of the cells."""
         return Cells(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 def uncalibrated(config: RadarConfig) -> RadarConfig:
-    """The radar without what was measured of its channels and of its range bias."""
+    """Return the radar's configuration without channel calibration and range bias."""
     return config.model_copy(update={"channel_calibration": None, "range_bias": 0.0})
 
 
 def cells_of(frames: Clip, progress: Callable[[int, int], None] = lambda done, total: None) -> Cells:
-    """The peaks of all frames that are whole; `progress` is called with (frames done, frames in all)."""
+    """Find the peaks of all complete frames; `progress` is called with (frames done, frames in all)."""
     source, span = frames.recording, frames.span
     signal = Signal(uncalibrated(frames.config))
     every = frames.numbers.step
@@ -71,7 +72,7 @@ def cells_of(frames: Clip, progress: Callable[[int, int], None] = lambda done, t
 
 
 def cells_of_batch(batch: Batch) -> Cells:
-    """The same of some frames; the batch's radar is best an `uncalibrated` one."""
+    """Find the peaks of a batch of frames; its radar should be `uncalibrated`."""
     heatmaps, config = batch.signal.heatmaps, batch.signal.radar
     spectrum = batch.spectrum.numpy()
     power = np.square(np.abs(spectrum)).sum(axis=3)
@@ -82,7 +83,7 @@ def cells_of_batch(batch: Batch) -> Cells:
     over_range, over_doppler = _offsets(power, place)
     speed = heatmaps.velocities[bin_] + 2 * config.max_velocity * batch.aliases[frame, bin_]
     off = config.velocity_resolution * over_doppler
-    # The slots' delays are turned back at the bin's speed; a peak between bins closes a little faster or more slowly.
+    # The phase of each slot's delay was corrected at the bin's speed; between bins the speed differs a little.
     delay = np.repeat(np.asarray(config.slot) * config.chirp_time, len(config.rx))
     turn = np.exp(4j * np.pi / config.wavelength * off[:, None] * delay)
     return Cells(
@@ -93,7 +94,7 @@ def cells_of_batch(batch: Batch) -> Cells:
 
 
 def joined(parts: list[Cells], antennas: int) -> Cells:
-    """Cells of consecutive batches as one."""
+    """Join the cells of consecutive batches."""
     if not parts:
         none = np.zeros(0)
         return Cells(np.zeros(0, int), none, none, none, none, np.zeros((0, antennas), np.complex64))
@@ -102,7 +103,8 @@ def joined(parts: list[Cells], antennas: int) -> Cells:
 
 @njit(cache=True)
 def _peaks(power, threshold, first, most):
-    """Local maxima (frame, range, doppler) of maps, cyclic in Doppler; of each frame at most the strongest."""
+    """Return local maxima (frame, range, doppler) of maps, cyclic in Doppler; at most the strongest `most` per
+    frame."""
     frames, ranges, bins = power.shape
     found = []
     for k in range(frames):
@@ -128,7 +130,7 @@ def _peaks(power, threshold, first, most):
 
 @njit(cache=True)
 def _offsets(power, place):
-    """Offsets of peaks in bins over range and Doppler, by parabolas through the logarithms of three powers."""
+    """Return offsets of peaks in bins over range and Doppler, by parabolas through the logarithms of three powers."""
     bins = power.shape[2]
     offsets = np.empty((2, len(place)))
     for i in range(len(place)):

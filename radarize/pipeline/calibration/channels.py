@@ -1,10 +1,11 @@
-"""Gains and phases of the channels from plane waves.
+"""Gains and phases of the channels, estimated from plane waves.
 
-A cell of range and Doppler that holds one far echo has the snapshot x = c s a(u): the channels' factors c times a plane
-wave from direction u. So each such cell measures c up to the wave's own amplitude and direction, and many cells, whose
-second echoes have random phases, measure it well. What plane waves leave open is a phase that grows evenly along the
-array, which turns all directions alike (after Friedlander and Weiss, "Direction finding in the presence of mutual
-coupling and unknown gain and phase", 1991); `radarize.pipeline.calibration.egomotion` finds that one.
+A range-Doppler cell with a single far echo has the snapshot x = c s a(u): the channel factors c times a plane wave of
+amplitude s from direction u. Each such cell measures c up to the wave's amplitude and direction. The average over many
+cells is accurate, since second echoes in them have random phases. Plane waves do not determine a phase that grows
+linearly along the array, which shifts all directions by the same amount (after Friedlander and Weiss, "Direction
+finding in the presence of mutual coupling and unknown gain and phase", 1991); `radarize.pipeline.calibration.egomotion`
+estimates it.
 """
 
 from dataclasses import dataclass
@@ -16,10 +17,10 @@ from radarize.pipeline.calibration.cells import Cells
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
 
-#: Share of the cells that is fitted, the purest; the purity from which on all are; and the least that is of any use.
+#: Share of the cells that is fitted, the purest ones; purity from which on all cells are fitted; minimum purity.
 _SHARE, _PURE, _LEAST = 0.4, 0.97, 0.5
 _ROUNDS, _SETTLED = 12, 1e-4
-#: Parts of the walk whose scatter gives standard errors.
+#: Number of parts of the walk, whose scatter gives standard errors.
 PARTS = 12
 
 
@@ -28,7 +29,7 @@ class Array:
 
     Attributes:
         positions: (antenna, 2) left and up, in wavelengths.
-        axes: those of the two along which antennas differ: directions along the other are not measured, and 0.
+        axes: axes (0 left, 1 up) along which antennas differ; direction cosines along another axis are 0.
     """
 
     def __init__(self, config: RadarConfig):
@@ -43,23 +44,23 @@ class Array:
         self._beams = self.wave(self._grid).conj().T.astype(np.complex64)
 
     def wave(self, directions: Float[np.ndarray, "n 2"]) -> Complex[np.ndarray, "n antenna"]:
-        """Plane waves from direction cosines to the left and up."""
+        """Return plane waves from direction cosines to the left and up."""
         return np.exp(-2j * np.pi * (directions @ self.positions.T))
 
     def slope(self, factors: Complex[np.ndarray, "antenna"]) -> Float[np.ndarray, "2"]:
-        """By how much larger direction cosines read through these channels: the even part of their phases."""
+        """Return the shift of direction cosines caused by the linear part of the channels' phases."""
         shift = np.zeros(2)
         shift[self.axes] = (self._inverse @ centred(factors))[1:]
         return shift
 
     def level(self, factors: Complex[np.ndarray, "antenna"]) -> Complex[np.ndarray, "antenna"]:
-        """The factors with a mean gain of 0 dB and without the part of their phases that `slope` finds."""
+        """Return the factors with a mean gain of 0 dB and without the linear part of their phases (`slope`)."""
         phases = centred(factors)
         phases -= self._slopes @ (self._inverse @ phases)
         return np.abs(factors) / np.exp(np.log(np.abs(factors)).mean()) * np.exp(1j * phases)
 
     def fit(self, snapshots: Complex[np.ndarray, "cell antenna"]) -> "Waves":
-        """The strongest plane wave in each of calibrated snapshots: the beam's peak, refined by its phases."""
+        """Fit the strongest plane wave to each calibrated snapshot: peak of the beamformer, refined by phases."""
         directions = np.empty((len(snapshots), 2))
         for start in range(0, len(snapshots), 4096):
             beams = np.abs(snapshots[start : start + 4096].astype(np.complex64) @ self._beams)
@@ -74,7 +75,7 @@ class Array:
         return Waves(directions, amplitude, np.square(np.abs(amplitude)) / power.clip(1e-30))
 
     def noise(self, purity: Float[np.ndarray, "cell"]) -> Float[np.ndarray, "cell 2"]:
-        """Standard deviations of direction cosines: what is no plane wave turns each antenna's phase at random."""
+        """Return standard deviations of direction cosines, if the residual of a plane wave is random per antenna."""
         spread = np.square(2 * np.pi * (self.positions - self.positions.mean(axis=0))).sum(axis=0)
         free = max(len(self.positions) - 1 - len(self.axes), 1) / len(self.positions)
         leftover = (1 - purity)[:, None] / (2 * free)
@@ -98,12 +99,12 @@ class Waves:
 
 @dataclass(frozen=True)
 class Channels:
-    """What plane waves tell of the channels.
+    """Channel factors, estimated from plane waves.
 
     Attributes:
-        factors: (antenna,) the channels', levelled (`Array.level`).
+        factors: (antenna,) channel factors, levelled (`Array.level`).
         error: (antenna, 2) standard errors of their gains (dB) and phases (rad).
-        waves: of all cells, read through the factors.
+        waves: plane waves of all cells, corrected by the factors.
     """
 
     factors: Complex[np.ndarray, "antenna"]
@@ -112,7 +113,7 @@ class Channels:
 
 
 def fit_channels(cells: Cells, array: Array) -> Channels:
-    """Channel factors from the purest cells, which are more as the factors get better."""
+    """Estimate channel factors from the purest cells, iteratively: better factors make more cells pure."""
     factors = np.ones(len(array.positions), complex)
     for _ in range(_ROUNDS):
         waves = array.fit(cells.snapshot / factors)
@@ -132,12 +133,12 @@ def _pure(waves: Waves) -> np.ndarray:
 
 
 def _mean(cells: Cells, waves: Waves, chosen: np.ndarray, array: Array) -> Complex[np.ndarray, "antenna"]:
-    """Mean of what chosen cells measure, the purer weighing more."""
+    """Return the mean of the factors that the chosen cells measure, weighted by purity."""
     expected = waves.amplitude[chosen, None] * array.wave(waves.directions[chosen])
     weight = 1 / (1.01 - waves.purity[chosen])
     return array.level(weight @ (cells.snapshot[chosen] / expected))
 
 
 def centred(factors: Complex[np.ndarray, "antenna"]) -> Float[np.ndarray, "antenna"]:
-    """Phases about the mean one, rad."""
+    """Return phases relative to their mean, rad."""
     return np.angle(factors * np.exp(-1j * np.angle(factors.sum())))

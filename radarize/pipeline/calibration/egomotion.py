@@ -1,12 +1,12 @@
-"""Velocities of a walk, and by what directions are wrong, from echoes of a static world.
+"""Velocities of a walk and errors of directions, estimated from echoes of a static world.
 
-An echo from direction u closes at v . u, v being the sensor's velocity. A phase that grows evenly along the array
-shifts all direction cosines by the same amount. A shift to the left looks like a course farther to the right, but only
-for echoes ahead: for echoes to the side, whose u_x = sqrt(1 - u_y^2 - u_z^2) changes the faster, it does not. So the
-wide azimuths of a walk tell the shift from the course. Elevations are bound twice: the sensor moves level, so that its
-tilt is in its velocity, and so are the reflections of upright walls, the strongest of all echoes. All is solved at
-once: a velocity for each frame; shifts, a scale of the azimuth and the tilt for the walk; by least squares with weights
-that outliers lose (Geman-McClure).
+An echo from direction u closes at v . u, where v is the velocity of the sensor. A phase that grows linearly along the
+array shifts all direction cosines by the same amount. For echoes ahead, a shift to the left looks like a course farther
+to the right; for echoes to the side it does not, because their u_x = sqrt(1 - u_y^2 - u_z^2) changes faster. The wide
+azimuths of a walk therefore separate the shift from the course. Elevation is constrained twice: the sensor moves
+horizontally, so that its tilt shows in its velocity, and the reflections of vertical walls, the strongest of all
+echoes, come from the horizon. One robust least-squares problem (Geman-McClure) estimates a velocity per frame, and the
+shifts, a scale of azimuth and the tilt of the whole walk.
 """
 
 from dataclasses import dataclass, replace
@@ -20,36 +20,36 @@ from radarize.pipeline.calibration.channels import PARTS, Array, Waves
 from radarize.radar.config import RadarConfig
 from radarize.signal.heatmaps import Heatmaps
 
-#: What is solved for beside the velocities, and its standard deviation before anything was measured: shifts of
-#: direction cosines to the left and up, scale of the one to the left less 1, and by how much the sensor's front and its
-#: left side are raised, rad.
+#: Indices of the unknowns beside the velocities, and their prior standard deviations: shifts of direction cosines to
+#: the left and up, scale of the one to the left minus 1, and rotation that raises the sensor's front or its left side,
+#: rad.
 SHIFT_LEFT, SHIFT_UP, SCALE, TILT, LEAN = VALUES = range(5)
 _EXPECTED = np.array([1.0, 1.0, 0.05, np.radians(3.0), np.radians(3.0)])
-#: Purity of cells that count; largest sine of azimuth; fewest cells and agreeing ones of a frame.
+#: Minimum purity of cells; maximum sine of azimuth; minimum number of cells, and of agreeing ones, per frame.
 PURE, _EDGE, _FEWEST = 0.85, 0.95, 8
-#: m/s: a speed's own standard deviation, that of climbing (its mean is zero), and the velocity that nobody walks at.
+#: m/s: standard deviation of a measured speed, of vertical velocity (mean zero), and of a velocity (prior).
 _SPEED, _CLIMB, _FASTEST = 0.008, 0.15, 10.0
-#: Standard deviation of elevations, by which readings are drawn to the horizon.
+#: Prior standard deviation of elevation direction cosines, about the horizon.
 _ELEVATION = 0.4
 _ROUNDS, _SIGMAS = 20, 3.0
-#: Errors over those by which parts of a walk differ: some are alike in all of it (8 walks of 20 s, handheld and by
-#: cart, in buildings of seeds 701 to 708).
+#: Ratio of standard errors to the scatter between parts of a walk: some errors are common to all parts (8 walks of 20
+#: s, handheld and on a cart, in buildings of seeds 701 to 708).
 _SHARED = 2.0
-#: Echoes of walls: power over the median cell's, purity, least range (m), largest elevation; the standard deviation of
-#: their height over the horizon, and of what counts in the fit, for many of them are the same wall's.
-_STRONG, _SINGLE, _OFF, _FLAT, _LEVEL, _ALIKE = 1e4, 0.95, 0.8, 0.3, 0.05, 0.1
+#: Echoes of walls: ratio of power to the median cell, purity, minimum range (m), maximum elevation; standard deviation
+#: of their elevation, and the one used as weight, larger since many of them come from the same wall.
+_STRONG, _SINGLE, _OFF, _FLAT, _LEVEL, _CORRELATED = 1e4, 0.95, 0.8, 0.3, 0.05, 0.1
 
 
 @dataclass(frozen=True)
 class EgoMotion:
-    """What was solved for.
+    """Velocities of a walk, and errors of directions.
 
     Attributes:
-        velocity: (frame, 3) m/s, sensor frame; the last column is what climbs beside the tilt.
+        velocity: (frame, 3) m/s, sensor frame; the last column is vertical velocity beyond the tilt.
         seen: (frame,) whether the frame's echoes determine a velocity.
         values, error: (value,) `SHIFT_LEFT` to `LEAN`, and standard errors from parts of the walk.
-        directions: (cell, 2) direction cosines, corrected.
-        residual: (cell,) closing speed less what a static world has, m/s; NaN where the frame has no velocity.
+        directions: (cell, 2) corrected direction cosines.
+        residual: (cell,) closing speed minus that of a static world, m/s; NaN where the frame has no velocity.
     """
 
     velocity: Float[np.ndarray, "frame 3"]
@@ -61,7 +61,7 @@ class EgoMotion:
 
 
 def solve(cells: Cells, waves: Waves, array: Array, config: RadarConfig, frames: int) -> EgoMotion:
-    """Solve for the motion of a walk of so many frames."""
+    """Estimate velocities and direction errors of a walk of `frames` frames."""
     motion = _initial(cells, waves, config, frames)
     noise = array.noise(waves.purity)
     used = (waves.purity > PURE) & motion.seen[cells.frame] & (np.abs(waves.directions[:, 0]) < _EDGE)
@@ -84,7 +84,7 @@ def solve(cells: Cells, waves: Waves, array: Array, config: RadarConfig, frames:
         off, by_velocity, by_value, variance = _linear(measured, spread, speed, velocity[frame], values)
         off -= span * np.rint(off / span)
         weight = 1 / (1 + off**2 / variance / _SIGMAS**2) ** 2 / variance
-        # Velocities are eliminated frame by frame, which leaves small equations of the walk's values.
+        # Velocities are eliminated frame by frame, which leaves a small system for the values of the walk.
         a, b, c = np.zeros((frames, 3, 3)), np.zeros((frames, 3, count)), np.zeros((frames, count, count))
         right, rest = np.zeros((frames, 3)), np.zeros((frames, count))
         weighted = weight[:, None] * by_velocity
@@ -114,7 +114,7 @@ def solve(cells: Cells, waves: Waves, array: Array, config: RadarConfig, frames:
 
 
 def _initial(cells: Cells, waves: Waves, config: RadarConfig, frames: int) -> EgoMotion:
-    """Velocities frame by frame, as odometry finds them."""
+    """Return initial velocities frame by frame, estimated as in odometry."""
     estimator = DopplerVelocity(Heatmaps(config))
     velocity, seen = np.zeros((frames, 3)), np.zeros(frames, bool)
     pure = np.flatnonzero(waves.purity > PURE)
@@ -134,10 +134,10 @@ def _initial(cells: Cells, waves: Waves, config: RadarConfig, frames: int) -> Eg
 def _linear(
     measured: np.ndarray, spread: np.ndarray, speed: np.ndarray, velocity: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Closing speed beyond the expected one, its derivatives with the minus sign taken off, and its variance."""
+    """Return closing speed minus expected one, its derivatives with opposite sign, and its variance."""
     left = (1 + values[SCALE]) * (measured[:, 0] - values[SHIFT_LEFT])
     up = measured[:, 1] - values[SHIFT_UP]
-    # Readings with errors bend a fit (see `radarize.odometry.doppler`): the expected direction stands for them.
+    # Measurement errors bias a fit (see `radarize.odometry.doppler`), so the expected direction is used instead.
     kept = _ELEVATION**2 / (_ELEVATION**2 + spread[:, 1] ** 2)
     up, leftover = kept * up, kept * spread[:, 1] ** 2 + spread[:, 0] ** 2
     ahead = np.sqrt(np.maximum(1 - left**2 - up**2 - leftover, 0.02))
@@ -156,11 +156,11 @@ def _linear(
 def _level(
     directions: np.ndarray, values: np.ndarray, frame: np.ndarray, normal: np.ndarray, right: np.ndarray
 ) -> None:
-    """Add to the equations of each frame that walls are upright: their reflections come from the horizon."""
+    """Add to the equations of each frame that walls are vertical: their reflections come from the horizon."""
     left, up = (1 + values[SCALE]) * (directions[:, 0] - values[SHIFT_LEFT]), directions[:, 1] - values[SHIFT_UP]
     ahead = np.sqrt(np.maximum(1 - left**2 - up**2, 0.02))
     over = values[TILT] * ahead + values[LEAN] * left + up
-    weight = 1 / (1 + over**2 / _LEVEL**2 / _SIGMAS**2) ** 2 / _ALIKE**2
+    weight = 1 / (1 + over**2 / _LEVEL**2 / _SIGMAS**2) ** 2 / _CORRELATED**2
     columns = np.zeros((len(over), len(VALUES)))
     columns[:, SHIFT_UP], columns[:, TILT], columns[:, LEAN] = 1.0, -ahead, -left
     np.add.at(normal, frame, weight[:, None, None] * columns[:, :, None] * columns[:, None])
@@ -168,7 +168,7 @@ def _level(
 
 
 def _jackknife(normal: np.ndarray, rest: np.ndarray, total: np.ndarray, sum_: np.ndarray) -> Float[np.ndarray, "value"]:
-    """Standard errors from solutions without each part of the walk, whose echoes last over many frames."""
+    """Return standard errors from solutions without each part of the walk; echoes last over many frames."""
     parts = np.array_split(np.arange(len(normal)), PARTS)
     without = [np.linalg.solve(total - normal[k].sum(axis=0), sum_ - rest[k].sum(axis=0)) for k in parts]
     formal = np.diag(np.linalg.inv(total))

@@ -1,9 +1,9 @@
-"""Where the sensor sits on its carrier, as far as the motion shows it.
+"""Mounting of the sensor on its carrier, as far as the motion determines it.
 
-Height: the floor's echoes. Yaw and lever arm: a carrier on wheels rolls straight ahead, so that the sensor, mounted
-with yaw psi at l_x ahead of the axle, moves with v_y cos(psi) + v_x sin(psi) = omega l_x. Whoever walks also steps
-sideways, and shows neither; how far to the side the sensor sits changes only the speed in turns, which nothing else
-measures.
+Height comes from the floor's echoes. Yaw and lever arm come from a carrier on wheels, which rolls straight ahead: a
+sensor with yaw psi at l_x ahead of the axle moves with v_y cos(psi) + v_x sin(psi) = omega l_x. A pedestrian also steps
+sideways, so that neither is observable. The lateral position of the sensor changes only the speed in turns, which
+nothing else measures.
 """
 
 from typing import NamedTuple
@@ -15,19 +15,19 @@ from radarize.pipeline.calibration.cells import Cells
 from radarize.pipeline.calibration.channels import PARTS, Waves
 from radarize.pipeline.calibration.egomotion import LEAN, PURE, TILT, EgoMotion
 
-#: Slower than this, m/s, a direction of motion says little; rad/s and m/s that turns and ways must have on average.
+#: m/s, minimum speed at which the direction of motion is used; rad/s, minimum standard deviation of yaw rate.
 _MOVING, _TURNING = 0.2, np.radians(5.0)
-#: m/s, the most that a carrier on wheels moves sideways.
+#: m/s, maximum sideways speed of a carrier on wheels.
 _ROLLS = 0.04
-#: Heights that are tried for the floor (m below the sensor), their spacing, and standard deviation of an elevation.
+#: Heights that are tried for the floor (m below the sensor), their spacing, and standard deviation of elevation (rad).
 _FLOOR, _STEP, _BLUR = (0.1, 2.0), 0.01, 0.05
-#: Echoes below this sine of the depression are a wall's; the floor's must be so many, and so many times what lies above
-#: and below them.
+#: Minimum sine of depression, below which echoes are those of walls; minimum number of echoes; minimum ratio of their
+#: density at the floor to that above and below it.
 _BELOW, _ECHOES, _STANDS_OUT = 0.25, 60, 1.25
 
 
 class Estimate(NamedTuple):
-    """A value with its standard error, or why there is none."""
+    """A value with its standard error, or the reason why it is unknown."""
 
     value: float = np.nan
     error: float = np.inf
@@ -35,7 +35,7 @@ class Estimate(NamedTuple):
 
 
 def roll(motion: EgoMotion, yaw: Float[np.ndarray, "frame"], period: float) -> tuple[Estimate, Estimate]:
-    """Yaw (rad) and lever arm ahead (m) of a sensor on wheels, from headings (rad) at each frame."""
+    """Estimate yaw (rad) and forward lever arm (m) of a sensor on wheels, from headings (rad) at each frame."""
     turning = np.gradient(yaw) / period if len(yaw) > 1 else np.zeros(len(yaw))
     forward, sideways = motion.velocity[:, 0], motion.velocity[:, 1]
     used = np.flatnonzero(motion.seen & (np.hypot(forward, sideways) > _MOVING))
@@ -60,7 +60,7 @@ def roll(motion: EgoMotion, yaw: Float[np.ndarray, "frame"], period: float) -> t
 
 
 def height(cells: Cells, waves: Waves, motion: EgoMotion, bias: float) -> Estimate:
-    """Height of the sensor over the floor, m: below the floor nothing echoes, and much does just above it."""
+    """Estimate the height of the sensor above the floor, m: echoes end at the floor, and are dense just above it."""
     left, up = motion.directions.T
     ahead = np.sqrt(np.maximum(1 - left**2 - up**2, 0.02))
     away = cells.range - bias
@@ -75,8 +75,11 @@ def height(cells: Cells, waves: Waves, motion: EgoMotion, bias: float) -> Estima
 
 
 def _edge(under: np.ndarray, away: np.ndarray) -> Estimate | None:
-    """The floor lies between the depth at which echoes are densest, for things stand on it, and that below it at which
-    they are half as dense, for elevations are blurred; None where none stand out from what is above and below."""
+    """Return the depth of the floor, or None if no depth stands out.
+
+    It lies between the depth at which echoes are densest, since objects stand on the floor, and the depth below it at
+    which they are half as dense, since elevations are blurred.
+    """
     depths = np.arange(*_FLOOR, _STEP)
     blur = _BLUR * away[:, None]
     density = (np.exp(-((under[:, None] - depths) ** 2) / 2 / blur**2) / blur).sum(axis=0)

@@ -1,11 +1,11 @@
-"""The range bias from parallax: how far away a point is, its direction says while the sensor passes by.
+"""Range bias from parallax: the change of a point's direction as the sensor passes determines its distance.
 
-Ranges alone do not show a bias that they all share, nor do Doppler shifts. But as the sensor moves across by d, the
-direction of a point at distance r turns by d / r: with a bias in its measured range, direction and range contradict
-each other. A point is fitted to each echo that is followed (`radarize.pipeline.calibration.tracks`), by ranges and
-directions; the turns of the sensor, whose errors look like parallax, are solved for together with them, and the bias,
-which is one for all. A wall's specular reflection is no point, as it stays on the wall's normal: no point fits it, and
-it is left out.
+Neither ranges nor Doppler shifts show a bias that is common to all ranges. But as the sensor moves sideways by d, the
+direction of a point at distance r turns by d / r: with a bias in the measured range, direction and range contradict
+each other. A point is fitted to the ranges and directions of each tracked echo
+(`radarize.pipeline.calibration.tracks`). The rotations of the sensor, whose errors look like parallax, and the common
+bias are estimated together with the points. The specular reflection of a wall is no point, since it stays on the wall's
+normal; no point fits it, and it is excluded.
 """
 
 from dataclasses import dataclass
@@ -17,26 +17,26 @@ from jaxtyping import Float, Int
 from radarize.pipeline.calibration.cells import Cells
 from radarize.pipeline.calibration.egomotion import EgoMotion
 
-#: Standard deviations of a measured range (m) and of direction cosines to the left and up; of a point's height over the
-#: sensor, m; and of a turn from one frame to the next as odometry has it, rad.
+#: Standard deviations of measured range (m), of direction cosines to the left and up, of a point's height above the
+#: sensor (m), and of the rotation between frames by odometry (rad).
 _RANGE, _LEFT, _UP, _HEIGHT, _TURN = 0.008, 0.008, 0.05, 0.6, np.radians(0.5)
-#: m, standard deviation of a bias before anything was measured; the largest that is taken for one.
+#: m, prior standard deviation of the bias, and its maximum magnitude.
 _BIAS, _LARGEST = 0.3, 0.45
-#: A track counts whose own bias has this standard error at most, m, and such a mean square of residuals.
+#: Maximum standard error of a track's own bias, m, and maximum mean square of its residuals.
 _PRECISE, _FITS = 0.2, 3.0
 _SIGMAS, _ROUNDS, _ALONE = 3.0, 10, 8
-#: Groups of tracks without each of which the bias is solved for again.
+#: Number of groups of tracks for the jackknife of the bias.
 _GROUPS = 10
 
 
 @dataclass(frozen=True)
 class RangeBias:
-    """What was found.
+    """Range bias estimated from parallax.
 
     Attributes:
-        value, error: m; measured ranges are larger by the value; the standard error is infinite where nothing tells.
-        tracks: points it comes from.
-        yaw: (frame,) rad, heading of the sensor, corrected.
+        value, error: bias (measured minus true range) and standard error, m; the error is infinite if not observable.
+        tracks: number of points used.
+        yaw: (frame,) corrected heading of the sensor, rad.
     """
 
     value: float
@@ -46,8 +46,8 @@ class RangeBias:
 
 
 class _Walk(NamedTuple):
-    """Poses of the sensor: places (frame, 2), headings (frame,), and by what the way of a frame to the next one moves
-    for a turn of its heading (frame, 2), m/rad."""
+    """Poses of the sensor: places (frame, 2), headings (frame,), and the derivative of the step from a frame to the
+    next with respect to its heading (frame, 2), m/rad."""
 
     place: np.ndarray
     yaw: np.ndarray
@@ -55,7 +55,7 @@ class _Walk(NamedTuple):
 
 
 class _Point(NamedTuple):
-    """A track's frames, ranges and directions, and the point (3,) in the world, heights counted from the sensor's."""
+    """Frames, ranges and directions of a track, and its point (3,) in the world, with height relative to the sensor."""
 
     frame: np.ndarray
     range: np.ndarray
@@ -70,12 +70,12 @@ def find_bias(
     yaw: Float[np.ndarray, "frame"],
     period: float,
 ) -> RangeBias:
-    """Solve for the range bias.
+    """Estimate the range bias.
 
     Args:
-        cells, tracks, motion: of the walk.
-        yaw: heading at each frame as odometry has it, rad, unwrapped.
-        period: of frames, s.
+        cells, tracks, motion: echoes, tracks and motion of the walk.
+        yaw: heading at each frame by odometry, rad, unwrapped.
+        period: frame period, s.
     """
     frames = np.arange(len(yaw))
     if not motion.seen.any():
@@ -114,7 +114,7 @@ def _walked(velocity: np.ndarray, yaw: np.ndarray, period: float) -> _Walk:
 
 
 def _start(cells: Cells, track: np.ndarray, motion: EgoMotion, walk: _Walk) -> _Point:
-    """The point as the middle of its track has it."""
+    """Return the point at the position that the middle of its track measures."""
     frame, middle = cells.frame[track], track[len(track) // 2]
     left, up = motion.directions[middle]
     here, away = cells.frame[middle], cells.range[middle]
@@ -124,8 +124,8 @@ def _start(cells: Cells, track: np.ndarray, motion: EgoMotion, walk: _Walk) -> _
 
 
 def _linear(point: _Point, walk: _Walk, bias: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Residuals of ranges and both directions in standard deviations (3n,), their weights, and the derivatives of what
-    is expected by the point (3n, 3) and by the heading of the frame (3n,)."""
+    """Return residuals of ranges and both directions in standard deviations (3n,), their weights, and the derivatives
+    of the expected values by the point (3n, 3) and by the heading of the frame (3n,)."""
     n, yaw = len(point.frame), walk.yaw[point.frame]
     c, s = np.cos(yaw), np.sin(yaw)
     off = np.column_stack([point.at[:2] - walk.place[point.frame], np.full(n, point.at[2])])
@@ -147,7 +147,8 @@ _LEVEL = np.diag([0.0, 0.0, _HEIGHT**-2])
 
 
 def _alone(point: _Point, walk: _Walk) -> tuple[_Point, float, float, float]:
-    """The point and a bias of its own, with its standard error, m, and the mean square of residuals."""
+    """Fit the point together with a bias of its own; return both, its standard error, m, and the mean square
+    residual."""
     bias, prior = 0.0, np.diag([0.0, 0.0, _HEIGHT**-2, _BIAS**-2])
     for _ in range(_ALONE):
         off, weight, by_point, _ = _linear(point, walk, bias)
@@ -163,7 +164,7 @@ def _alone(point: _Point, walk: _Walk) -> tuple[_Point, float, float, float]:
 
 
 def _moved(point: _Point, walk: _Walk, bias: float) -> _Point:
-    """The point, fitted to given headings and bias."""
+    """Fit the point for given headings and bias."""
     for _ in range(2):
         off, weight, by_point, _ = _linear(point, walk, bias)
         normal = (by_point * weight[:, None]).T @ by_point + _LEVEL
@@ -173,13 +174,13 @@ def _moved(point: _Point, walk: _Walk, bias: float) -> _Point:
 
 
 def _reduced(point: _Point, walk: _Walk, bias: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Equations of the headings and, last, the bias that are left when the point is eliminated: places of the unknowns,
-    normal matrix, right side."""
+    """Return the equations of headings and, last, bias after elimination of the point: indices of the unknowns, normal
+    matrix, right-hand side."""
     off, weight, by_point, by_yaw = _linear(point, walk, bias)
     n, first, last = len(point.frame), point.frame[0], point.frame[-1]
     misfit = (weight * off**2).sum() / max(weight.sum() - 4, 1)
     weight = weight / (1 + (misfit / _FITS) ** 2)
-    # A turn moves all places after it, and the point is seen from these; counted from the track's first frame.
+    # A rotation moves all later places from which the point is seen; counted from the first frame of the track.
     span = np.arange(first, last + 1)
     frame = np.tile(point.frame, 3)
     columns = np.zeros((3 * n, len(span) + 1))
@@ -193,7 +194,7 @@ def _reduced(point: _Point, walk: _Walk, bias: float) -> tuple[np.ndarray, np.nd
 
 
 def _turns(expected: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Equations of turns that are as odometry has them, of the first heading, and of the bias."""
+    """Return the equations of rotations as measured by odometry, of the first heading, and of the prior of the bias."""
     count = len(yaw)
     normal, right = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
     off = np.diff(expected - yaw) / _TURN**2
@@ -210,7 +211,8 @@ def _turns(expected: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _error(normal: np.ndarray, parts: list) -> float:
-    """Standard error of the bias: formal, or by what it is without each group of tracks, if that is larger."""
+    """Return the standard error of the bias: the formal one, or that of the jackknife over groups of tracks if
+    larger."""
     without = []
     for group in np.array_split(np.arange(len(parts)), min(_GROUPS, len(parts))):
         rest, right = normal.copy(), np.zeros(len(normal))

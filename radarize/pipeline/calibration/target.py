@@ -1,8 +1,9 @@
-"""Calibration by a corner reflector at a known distance straight ahead of a radar that stands still.
+"""Calibration with a corner reflector at a known distance straight ahead of a radar that stands still.
 
-As the SDK demo's ``measureRangeBiasAndRxChanPhase`` does it (mmWave SDK user's guide): the strongest echo within a
-window about the distance gives the range bias, measured less true range, and its amplitude in each channel the factors.
-The array is compared with the echo of a point at that distance, so its directions are right without any motion.
+The method is that of ``measureRangeBiasAndRxChanPhase`` in the SDK demo (mmWave SDK user's guide): the strongest echo
+in a window around the distance gives the range bias, as measured minus true range, and its amplitudes in the channels
+give the factors. They are compared with the echo of a point at that distance, so that directions are correct without
+motion.
 """
 
 from typing import NamedTuple
@@ -18,19 +19,19 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Preprocessor, Signal
 
-#: m about the distance within which the reflector is looked for; frames that are used, at most; and how many times the
-#: power of the median range it must have, and of what moves at its range, Doppler sidelobes (-43 dB) aside.
+#: m, half width of the range window; maximum number of frames; minimum ratio of the reflector's power to that of the
+#: median range, and to that of moving echoes at its range, Doppler sidelobes (-43 dB) excluded.
 WINDOW, _FRAMES, _STRONG, _STILL = 0.5, 128, 1e3, 30.0
 
 
 class Reflector(NamedTuple):
-    """What was measured.
+    """Range bias and channel factors, measured with a corner reflector.
 
     Attributes:
-        factors: (antenna,) the channels', with a mean gain of 0 dB.
+        factors: (antenna,) channel factors with a mean gain of 0 dB.
         error: (antenna, 2) standard errors of their gains (dB) and phases (rad).
-        bias, bias_error: m.
-        frames: that were used.
+        bias, bias_error: range bias and its standard error, m.
+        frames: number of frames used.
     """
 
     factors: Complex[np.ndarray, "antenna"]
@@ -41,7 +42,7 @@ class Reflector(NamedTuple):
 
 
 def measure(frames: Clip, distance: float) -> Reflector:
-    """Measure a reflector at a distance, m.
+    """Measure range bias and channel factors with a reflector at a distance, m.
 
     Raises:
         InputError: no echo stands out there, the radar moves, or the distance is out of range.
@@ -65,7 +66,7 @@ def measure(frames: Clip, distance: float) -> Reflector:
     at = int(near[power[near, still].argmax()])
     if power[at, still] < _STRONG * np.median(power[:, still]):
         raise InputError(
-            f"{path}: no echo stands out within {WINDOW} m about {distance:g} m, expected a corner reflector there"
+            f"{path}: no strong echo is within {WINDOW} m of {distance:g} m, expected a corner reflector there"
         )
     apart = np.abs(np.arange(config.loops) - still) > 3
     if power[at, apart].max(initial=0) * _STILL > power[at, still]:
@@ -86,9 +87,9 @@ def measure(frames: Clip, distance: float) -> Reflector:
 
 
 def _echo(config: RadarConfig, distance: float) -> Complex[np.ndarray, "antenna"]:
-    """Phasors of a point straight ahead of the middle of the array, at the distance from there."""
+    """Return the phasors of a point straight ahead of the centre of the array, at a distance from there."""
     out, back = tx_positions(config), rx_positions(config)
     middle = (out.mean(axis=0) + back.mean(axis=0)) / 2
     point = middle + np.array([distance, 0.0, 0.0])
     path = np.linalg.norm(point - out, axis=1)[:, None] + np.linalg.norm(point - back, axis=1)
-    return np.exp(2j * np.pi / config.wavelength * (path - 2 * distance)).ravel()  # the nearer, the less phase
+    return np.exp(2j * np.pi / config.wavelength * (path - 2 * distance)).ravel()  # a shorter path has less phase

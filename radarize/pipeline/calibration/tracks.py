@@ -1,4 +1,4 @@
-"""Echoes that are followed from frame to frame by the range, speed and direction that the sensor's motion predicts."""
+"""Tracks of echoes from frame to frame, predicted from the motion of the sensor."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -7,31 +7,31 @@ from radarize.pipeline.calibration.cells import Cells
 from radarize.pipeline.calibration.channels import Waves
 from radarize.pipeline.calibration.egomotion import EgoMotion
 
-#: Purity of cells that are followed, largest sine of azimuth, and m/s that a static world may be off.
+#: Minimum purity of tracked cells, maximum sine of azimuth, and maximum residual of a static echo, m/s.
 _PURE, _EDGE, _STATIC = 0.8, 0.93, 0.1
-#: Frames after which an echo that is not seen is given up, and the fewest that make a track.
+#: Frames without detection after which a track ends, and minimum number of cells of a track.
 _LOST, _FEWEST = 3, 12
-#: By how much an echo differs from its prediction: range, m; direction cosines to the left and up; speed, m/s; and the
-#: most that the squares of all four add up to.
+#: Standard deviations of an echo about its prediction: range, m; direction cosines to the left and up; speed, m/s; and
+#: the gate: maximum sum of the four normalised squares.
 _APART, _MOST = np.array([0.03, 0.05, 0.2, 0.15]), 6.0
 
 
 def tracks_of(
     cells: Cells, waves: Waves, motion: EgoMotion, turning: Float[np.ndarray, "frame"], period: float
 ) -> list[Int[np.ndarray, "cell"]]:
-    """Cells of each echo that is followed long enough, in order of time.
+    """Return the cells of each sufficiently long track, in order of time.
 
     Args:
-        cells, waves, motion: of the walk.
+        cells, waves, motion: echoes, plane waves and motion of the walk.
         turning: yaw rate at each frame, rad/s.
-        period: of frames, s.
+        period: frame period, s.
     """
     left, up = motion.directions.T
     ahead = np.sqrt(np.maximum(1 - left**2 - up**2, 0.02))
     static = np.abs(np.nan_to_num(motion.residual, nan=np.inf)) < _STATIC
     chosen = np.flatnonzero(static & (waves.purity > _PURE) & (np.abs(left) < _EDGE))
     velocity = motion.velocity[cells.frame]
-    # By how much a point's direction moves: it turns with the sensor and passes by.
+    # Rate of a point's azimuth cosine, from the rotation of the sensor and its motion past the point.
     moves = -turning[cells.frame] * ahead - (velocity[:, 1] - cells.speed * left) / np.maximum(cells.range, 0.3)
     live: list[list[int]] = []
     found: list[list[int]] = []

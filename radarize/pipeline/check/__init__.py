@@ -1,1 +1,1 @@
-"""Check a recording for the faults that its samples show: what is wrong, how sure, what mends it."""
+"""Check a recording for faults that its samples show: the fault, the confidence, and the correction."""

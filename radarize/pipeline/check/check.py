@@ -1,4 +1,4 @@
-"""Check a recording: the faults that its samples show."""
+"""Check a recording for faults that its samples show."""
 
 import json
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ from radarize.pipeline.check.summary import Sequence
 
 @dataclass(frozen=True)
 class Check:
-    """What a check found.
+    """Result of a check.
 
     Attributes:
         findings: faults, in the order of the tests.
@@ -34,42 +34,43 @@ class Check:
 
     @property
     def well(self) -> bool:
-        """Nothing was found."""
+        """Whether no fault was found."""
         return not self.findings
 
     def warnings(self) -> list[str]:
-        """A sentence on each finding."""
+        """Return a sentence on each finding."""
         return [str(each) for each in self.findings]
 
     def to_json(self) -> str:
-        """All of it as JSON."""
+        """Return the result as JSON."""
         found = {
             "well": self.well, "findings": [each.row() for each in self.findings], "not_observable": self.not_observable
         }  # fmt: skip
         return json.dumps(found, indent=2)
 
     def __str__(self) -> str:
-        told = self.warnings() or ["no fault found"]
-        return "\n".join([*told, *(f"not observable: {kind}: {why}" for kind, why in self.not_observable.items())])
+        lines = self.warnings() or ["no fault found"]
+        return "\n".join([*lines, *(f"not observable: {kind}: {why}" for kind, why in self.not_observable.items())])
 
 
 def check(recording: Source, fix: str | Path | None = None) -> Check:
-    """Find what is wrong with a recording, from the samples of a walk.
+    """Find faults of a recording from the samples of a walk.
 
-    In a static world, Doppler, range and the phases over antennas and chirps are bound to each other. So ten seconds of
-    a moving radar show whether I and Q, transmitters, receivers, chirps, frames and stamps are what the configuration
-    says. What cannot be seen, such as left and right without an IMU or true poses, is listed with the reason.
+    In a static world, Doppler, range and the phases over antennas and chirps depend on each other. Ten seconds of a
+    moving radar therefore show whether I and Q, transmitters, receivers, chirps, frames and time stamps agree with the
+    configuration. What is not observable, such as left and right without an IMU or true poses, is listed with the
+    reason.
 
     Args:
         recording: a recording or a file, or frames of one such as ``rec[:300]``.
-        fix: recording to write (``.h5``) in which all is mended that reordering, exchange or another configuration
-            mends; a board's file (``.yaml``) if that is what is wrong.
+        fix: recording to write (``.h5``) in which everything is corrected that reordering, exchange or another
+            configuration corrects; or a board file (``.yaml``) if the board is wrong.
 
     Returns:
-        ``.findings`` (kind, what was measured, how sure, remedy), ``.not_observable`` (why by kind), ``.well``.
+        ``.findings`` (kind, measurement, confidence, remedy), ``.not_observable`` (reason by kind), ``.well``.
 
     Raises:
-        InputError: an unusable recording, one without samples, or nothing to be mended with `fix`.
+        InputError: an unusable recording, one without samples, or `fix` is given and nothing can be corrected.
 
     Example:
         >>> rz.check(rec).well
@@ -82,35 +83,35 @@ def check(recording: Source, fix: str | Path | None = None) -> Check:
         raise InputError(f"{frames.recording.path}: has no whole frame, expected at least one")
     found = check_evidence(Evidence.of(frames))
     if fix is not None:
-        from radarize.pipeline.check.mending import write_mended
+        from radarize.pipeline.check.correction import write_corrected
 
-        write_mended(frames, found.findings, Path(fix))
+        write_corrected(frames, found.findings, Path(fix))
     return found
 
 
 def warnings_before(frames: Clip) -> list[str]:
-    """A sentence on each fault that some frames of a recording show, for those who are about to use it.
+    """Return a sentence on each fault that some frames of a recording show, before it is used.
 
-    Asked again of the same open recording, it is not checked again.
+    The result is cached for an open recording.
     """
-    return [*map(str, _looked_at(frames).findings)]
+    return [*map(str, _checked(frames).findings)]
 
 
 def warnings_after(frames: Clip, sequence: Sequence) -> list[str]:
-    """The same of faults that only all frames together show.
+    """Return a sentence on each fault that only all frames together show.
 
     Args:
-        frames: as before.
-        sequence: of all frames of their span, by who has read them anyway.
+        frames: as in `warnings_before`.
+        sequence: summary of all frames of their span, from reading them.
     """
     evidence = Evidence.of(frames.recording[frames.span.start : frames.span.stop])
     evidence.sequence = sequence
-    before = _looked_at(frames).findings
+    before = _checked(frames).findings
     found = check_evidence(evidence, [test for test in TESTS if test.whole], before)
     return [*map(str, found.findings[len(before) :])]
 
 
-def _looked_at(frames: Clip) -> "Check":
+def _checked(frames: Clip) -> "Check":
     recording, span = frames.recording, frames.span
     if not recording.has_samples or not len(frames):
         return Check((), {})
@@ -122,23 +123,23 @@ def _looked_at(frames: Clip) -> "Check":
     return known[span]
 
 
-#: At which frames are looked at closely before a run: half of those of a check, in half its time.
+#: Number of places that are examined before a run: half of those of a check, in half the time.
 _PLACES = PLACES // 2
-#: What was found in open recordings, by the span of frames.
+#: Results for open recordings, by the span of frames.
 _CHECKED: WeakKeyDictionary[Recording, dict[range, Check]] = WeakKeyDictionary()
 
 
 def check_evidence(evidence: Evidence, tests: Iterable[Test] = TESTS, before: tuple[Finding, ...] = ()) -> Check:
-    """Tests on evidence.
+    """Run tests on evidence.
 
-    What hides others is mended for the tests that follow; if it cannot be, these are not made.
+    A fault that hides others is corrected for the tests that follow; if it cannot be, these are skipped.
 
     Args:
-        tests: in their order.
-        before: what others found; mended in the evidence or not.
+        tests: tests in order.
+        before: findings of earlier tests, corrected in the evidence or not.
     """
     findings, unseen = [*before], {}
-    blocked = next((each.kind for each in before if each.hides and each.mending is None), "")
+    blocked = next((each.kind for each in before if each.hides and each.correction is None), "")
     for test in tests:
         hidden = blocked or ", ".join(each.kind for each in findings if each.kind in test.unless)
         if hidden:
@@ -151,8 +152,8 @@ def check_evidence(evidence: Evidence, tests: Iterable[Test] = TESTS, before: tu
             continue
         findings += found
         for each in found:
-            if each.mending is not None:
-                evidence = evidence.mended(each.mending)
+            if each.correction is not None:
+                evidence = evidence.corrected(each.correction)
             elif each.hides:
                 blocked = each.kind
     return Check(tuple(findings), unseen)

@@ -1,4 +1,4 @@
-"""Faults of what is received beside the world's echoes: interference, and the range at which leakage is seen."""
+"""Interference, and transmitter leakage at a wrong range."""
 
 from collections.abc import Iterator
 
@@ -9,28 +9,29 @@ from radarize.pipeline.check.finding import Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.signal.disturbance import find_flaws
 
-#: Share of disturbed chirps.
+#: Share of disturbed chirps above which interference is reported.
 _DISTURBED = 0.003
-#: m: where leakage from the transmitters, some cm away, is seen; dB that it must be above its surroundings.
+#: m, range in which leakage of the transmitters, some cm away, is expected; dB by which it must exceed its
+#: surroundings.
 _LEAKS, _ABOVE = (-0.06, 0.18), 6.0
-#: m: how far away it is sought.
+#: m, range up to which leakage is searched.
 _SOUGHT = 0.8
 
 
 def interference(evidence: Evidence) -> Iterator[Finding]:
-    """Chirps off in level."""
+    """Find chirps whose level deviates from that of the others."""
     if not len(evidence.samples):
         raise NotObservable("no frame is whole")
     share = float(find_flaws(evidence.samples, evidence.valid[evidence.chosen]).disturbed.mean())
     if share > _DISTURBED:
         yield Finding(
             "interference", f"{share:.1%} of the chirps differ from the others of their frame in level in most ranges",
-            sureness(share, _DISTURBED), "use another start frequency, or find the other radar; `run` leaves them out",
+            sureness(share, _DISTURBED), "use another start frequency, or find the other radar; `run` omits them",
         )  # fmt: skip
 
 
 def leakage(evidence: Evidence) -> Iterator[Finding]:
-    """The transmitters' leakage is at another range than a few centimetres."""
+    """Find transmitter leakage at a range other than a few centimetres."""
     config = evidence.config
     still = np.square(np.abs(evidence.profiles.mean(axis=(0, 1)))).mean(axis=(0, 1))
     reach = max(int(np.searchsorted(config.ranges, _SOUGHT)), 3)

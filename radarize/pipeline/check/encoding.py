@@ -1,10 +1,9 @@
-"""Faults of how words became samples: order of I and Q, of receivers within a chirp, of bytes, of chirps.
+"""Faults in the decoding of samples: order of I and Q, of receivers within a chirp, of bytes, of chirps.
 
-Samples in their right order make sharp peaks over range and Doppler; in a wrong one, parts of several chirps or of I
-and Q take turns, and each peak falls apart into many. So the reading of the words that has the least entropy is the
-right one (entropy of the spectrum's power, as in autofocus of synthetic aperture radars). I and Q exchanged leave
-peaks as sharp as they were and mirror range, Doppler and azimuth together: then the transmitters' leakage, which is the
-nearest of all echoes, is at negative range.
+Samples in their correct order have sharp peaks over range and Doppler; in a wrong order, parts of several chirps or of
+I and Q alternate, and each peak splits into many. The correct order is therefore the one with the least entropy of the
+power spectrum, as in autofocus of synthetic aperture radar. I and Q exchanged keep the peaks sharp and mirror range,
+Doppler and azimuth together: then the transmitters' leakage, the nearest of all echoes, is at negative range.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,17 +12,17 @@ import numpy as np
 import scipy.fft
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
 from radarize.signal.snapshots import NEAREST
 
-#: By how much, nats, the entropy of another reading must be less.
+#: Nats by which the entropy with another order must be less.
 _LESS = 0.25
-#: dB by which leakage is stronger on the side where it is: 19 and more in public captures of three boards.
+#: dB by which leakage at positive and negative range must differ; at least 19 in public captures of three boards.
 _LEAKS = 6.0
-#: m: reach of the leakage.
+#: m, largest range of leakage.
 _LEAKAGE = 0.3
 _ASKED = 4
 
@@ -31,11 +30,11 @@ Reading = Callable[[np.ndarray], np.ndarray]
 
 
 def readings(config: RadarConfig) -> dict[str, tuple[str, Reading]]:
-    """Other readings of the same words, by name: the remedy, and what frames become."""
+    """Return other orders of the same words by name: the remedy, and a function that reorders frames."""
     loops, tx, rx, samples, _ = config.frame_shape
 
     def words(frames: np.ndarray) -> np.ndarray:
-        """In the order of capture."""
+        """Return words in the order of capture."""
         return encode(frames, config).reshape(len(frames), loops, tx, -1)
 
     def physical(chirps: np.ndarray) -> np.ndarray:
@@ -71,25 +70,25 @@ def readings(config: RadarConfig) -> dict[str, tuple[str, Reading]]:
 
 
 def order_of_words(evidence: Evidence) -> Iterator[Finding]:
-    """Another reading of the words makes much sharper spectra."""
+    """Find another order of words with much sharper spectra."""
     some = evidence.samples[:: max(len(evidence.samples) // _ASKED, 1)][:_ASKED]
     first = max(int(np.searchsorted(evidence.config.ranges, NEAREST)), 1)
     here = entropies(some, first)
     less = {}
     for kind, (_, reading) in readings(evidence.config).items():
-        # What is made sharper over range is a matter within chirps, over Doppler one among them.
+        # Errors within a chirp blur range, errors among chirps blur Doppler.
         less[kind] = float((here - entropies(reading(some), first)).sum())
     kind = max(less, key=lambda name: less[name])
     if less[kind] > _LESS:
         remedy, reading = readings(evidence.config)[kind]
         yield Finding(
-            kind, f"the entropy of range and Doppler is {less[kind]:.2f} nats less if it is read otherwise",
-            sureness(less[kind], _LESS), remedy, Mending(samples=reading), hides=True,
+            kind, f"the entropy of range and Doppler is {less[kind]:.2f} nats less in another order",
+            sureness(less[kind], _LESS), remedy, Correction(samples=reading), hides=True,
         )  # fmt: skip
 
 
 def entropies(frames: np.ndarray, first: int) -> np.ndarray:
-    """Of power over range and over Doppler, nats; Doppler of ranges from bin `first` on."""
+    """Return entropies of power over range and over Doppler, nats; Doppler at ranges from bin `first` on."""
     signal = np.ascontiguousarray(frames, np.float32).view(np.complex64)[..., 0]
     loops, samples = signal.shape[1], signal.shape[-1]
     profile = scipy.fft.fft(signal * np.hanning(samples).astype(np.float32), axis=-1)
@@ -97,7 +96,7 @@ def entropies(frames: np.ndarray, first: int) -> np.ndarray:
     over_range = np.square(np.abs(profile)).mean(axis=(1, 2, 3))
     power = np.square(np.abs(doppler)).mean(axis=(2, 3))
     inside = power[:, :, first : samples - first]
-    # Of each range alone, weighted by its power, so that range's own shape has no say.
+    # The entropy over Doppler of each range alone, weighted by power, so that the range profile has no influence.
     return np.array([_entropy(over_range).mean(), _entropy(inside.mean(axis=2)).mean()])
 
 
@@ -107,12 +106,12 @@ def _entropy(power: np.ndarray) -> np.ndarray:
 
 
 def i_and_q(evidence: Evidence) -> Iterator[Finding]:
-    """The transmitters' leakage is at negative range."""
+    """Find transmitter leakage at negative range."""
     config = evidence.config
     power = np.median(np.square(np.abs(evidence.profiles)), axis=(0, 1))
     levels = 10 * np.log10(power.reshape(-1, power.shape[-1]) + 1e-12)
     reach = max(int(np.searchsorted(config.ranges, _LEAKAGE)), 2)
-    # The median over channels: one that is stuck has all of its power at zero.
+    # The median over channels, because a stuck channel has all its power at zero.
     leak = float(np.median(levels[:, 1 : reach + 1].max(axis=1) - levels[:, -reach:].max(axis=1)))
     if abs(leak) < _LEAKS:
         raise NotObservable(f"levels at positive and at negative range near zero differ by {leak:.1f} dB only")
@@ -121,5 +120,5 @@ def i_and_q(evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             "I and Q", f"leakage at negative range is {-leak:.0f} dB stronger than at positive range",
             sureness(-leak, _LEAKS), f"import it with --iq-order {other}: I and Q are exchanged",
-            Mending(samples=lambda frames: np.ascontiguousarray(frames[..., ::-1])), hides=True,
+            Correction(samples=lambda frames: np.ascontiguousarray(frames[..., ::-1])), hides=True,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What the tests of a check look at: some frames of a recording, each product made once, when a test asks for it."""
+"""Data that the tests of a check examine: some frames of a recording, and products computed on first access."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -11,7 +11,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Clip
 from radarize.io.trajectory import Trajectory
 from radarize.odometry.inertial import Imu
-from radarize.pipeline.check.finding import Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, NotObservable
 from radarize.pipeline.check.motion import Motions, find_motions
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
 from radarize.pipeline.check.summary import Sequence, Summary
@@ -19,28 +19,28 @@ from radarize.pipeline.check.tracks import Tracks, find_tracks
 from radarize.radar.config import RadarConfig
 from radarize.signal.snapshots import Snapshots, find_snapshots
 
-#: Frames that are looked at closely: so many places, evenly over the recording, and consecutive frames at each.
+#: Frames that are examined: number of places, evenly over the recording, and of consecutive frames at each.
 PLACES, RUN = 16, 4
-#: Loops of a frame that its description takes one of; frames read at a time.
+#: The spectra use every N-th loop of a frame; frames read at a time.
 _EVERY, _BATCH = 8, 16
 
 Frames = Int16[np.ndarray, "frame loop tx rx sample 2"]
 
 
 class Evidence:
-    """Of one recording, or of the first frames of a stream.
+    """Data of a recording, or of the first frames of a stream, for the tests of a check.
 
     Args:
-        config: of the radar.
+        config: configuration of the radar.
         times: starts of all frames, s.
         valid: per chirp, False where samples were lost.
-        read: called with (start, stop), returns those frames.
-        truth: true poses, where they are known.
-        imu: where there is one.
-        numbers: of the frames in the recording; from 0 if None.
+        read: returns the frames start to stop - 1 when called with (start, stop).
+        truth: true poses, if known.
+        imu: IMU, if there is one.
+        numbers: numbers of the frames in the recording; from 0 if None.
 
     Attributes:
-        places: at which frames are looked at closely.
+        places: number of places at which frames are examined.
     """
 
     places = PLACES
@@ -64,7 +64,7 @@ class Evidence:
 
     @classmethod
     def of(cls, frames: Clip) -> "Evidence":
-        """Of frames of a recording, with its truth and its IMU."""
+        """Return the evidence of frames of a recording, with its truth and its IMU."""
         start, step = frames.span.start, frames.numbers.step
         adc = frames.recording.adc
 
@@ -73,46 +73,46 @@ class Evidence:
 
         try:
             imu = Imu.of(frames.recording) if frames.recording.has("imu/time") else None
-        except InputError:  # one that is of no use is as good as none
+        except InputError:  # an unusable IMU counts as none
             imu = None
         return cls(frames.config, frames.times, frames.valid, read, frames.truth, imu, np.asarray(frames.numbers))
 
-    def mended(self, mending: Mending) -> "Evidence":
-        """What it would be of the mended recording."""
-        config, read, change = mending.config or self.config, self._read, mending.samples
+    def corrected(self, correction: Correction) -> "Evidence":
+        """Return the evidence of the corrected recording."""
+        config, read, change = correction.config or self.config, self._read, correction.samples
         times, valid, numbers = self.times, self.valid, self.numbers
-        if (order := mending.order) is not None:
+        if (order := correction.order) is not None:
             valid, numbers = valid[order], numbers[order]
-            times = times[: len(order)] if mending.keeps_stamps else times[order]
-        if mending.period is not None:
-            times = times[0] + mending.period * np.arange(len(times))
+            times = times[: len(order)] if correction.keeps_stamps else times[order]
+        if correction.period is not None:
+            times = times[0] + correction.period * np.arange(len(times))
 
-        def mend(first: int, last: int) -> Frames:
+        def corrected_frames(first: int, last: int) -> Frames:
             if order is None:
                 samples = read(first, last)
             else:
                 samples = np.concatenate([read(k, k + 1) for k in order[first:last]])
             return samples if change is None else change(samples)
 
-        mended = Evidence(config, times, valid, mend, self.truth, self.imu, numbers)
-        mended.places = self.places
-        return mended
+        corrected = Evidence(config, times, valid, corrected_frames, self.truth, self.imu, numbers)
+        corrected.places = self.places
+        return corrected
 
     def read(self, start: int, stop: int) -> Frames:
-        """Frames start...stop-1."""
+        """Read frames start to stop - 1."""
         return self._read(start, stop)
 
-    # --- frames that are looked at closely ---------------------------------------------------------------------------
+    # --- frames that are examined --------- ---------------------------------------------------------------------------
     @cached_property
     def chosen(self) -> Int[np.ndarray, "frame"]:
-        """Numbers of the frames looked at closely, without lost and silent ones."""
+        """Numbers of the examined frames, without lost and silent ones."""
         starts = np.unique(np.linspace(0, max(len(self) - RUN, 0), self.places).astype(int))
         near = np.unique((starts[:, None] + np.arange(RUN)).clip(max=len(self) - 1))
         return near[self.valid[near].mean(axis=(1, 2)) > 0.5]
 
     @cached_property
     def samples(self) -> Frames:
-        """Of the chosen frames."""
+        """Samples of the examined frames."""
         if not len(self.chosen):
             return np.zeros((0, *self.config.frame_shape), np.int16)
         runs = np.split(self.chosen, np.flatnonzero(np.diff(self.chosen) > 1) + 1)
@@ -120,7 +120,7 @@ class Evidence:
 
     @cached_property
     def profiles(self) -> Complex64[np.ndarray, "frame loop tx rx range"]:
-        """Spectra over samples (Hann, a beat of amplitude 1 reads 1) of some loops of the chosen frames."""
+        """Range spectra (Hann, a beat of amplitude 1 has amplitude 1) of some loops of the examined frames."""
         some = np.ascontiguousarray(self.samples[:: max(1, RUN // 2), ::_EVERY], np.float32)
         window = np.hanning(self.config.samples).astype(np.float32)
         return scipy.fft.fft(some.view(np.complex64)[..., 0] * (window / window.sum()), axis=-1)
@@ -133,31 +133,31 @@ class Evidence:
 
     @cached_property
     def cells(self) -> Snapshots:
-        """Of the chosen frames; `Snapshots.frame` holds their numbers."""
+        """Echoes of the examined frames; `Snapshots.frame` has their numbers."""
         found = find_snapshots(self.samples, self.config, self.valid[self.chosen])
         return found._replace(frame=self.chosen[found.frame])
 
     @cached_property
     def reading(self) -> Reading:
-        """Antennas as configured."""
+        """Antennas of the channels as configured."""
         return Reading.of(self.config)
 
     @cached_property
     def waves(self) -> PlaneWaves:
-        """The cells as plane waves over them."""
+        """Echoes as plane waves over the configured antennas."""
         return fit_plane_waves(self.cells, self.reading)
 
     @cached_property
     def tracks(self) -> Tracks:
-        """Cells that are met again in the next frames."""
+        """Echoes that are found again in the next frames."""
         return find_tracks(self.cells, self.waves if np.prod(self.config.frame_shape[1:3]) >= 4 else None)
 
     @cached_property
     def motions(self) -> Motions:
-        """How the radar moves at the chosen places.
+        """Motion of the radar at the examined places.
 
         Raises:
-            NotObservable: channels are too few for directions.
+            NotObservable: there are too few channels for directions.
         """
         if np.prod(self.config.frame_shape[1:3]) < 4:
             raise NotObservable("there are too few channels for directions")
@@ -166,7 +166,7 @@ class Evidence:
     # --- all frames --------------------------------------------------------------------------------------------------
     @cached_property
     def sequence(self) -> Sequence:
-        """All frames in short; who has read them already may have set it."""
+        """Summary of all frames; set from outside if they were read already."""
         summary = Summary(self.config)
         for start in range(0, len(self), _BATCH):
             summary.add(self._read(start, min(start + _BATCH, len(self))))

@@ -1,7 +1,7 @@
-"""The faults that a check looks for, in the order in which it does: what spoils everything else comes first.
+"""Faults that a check looks for, in the order of the tests: first those that hide all others.
 
-A test is a function from `Evidence` to findings; it raises `NotObservable` where the recording does not show whether
-the fault is there. One of your own is a function and a line here.
+A test is a function from `Evidence` to findings; it raises `NotObservable` if the recording does not show whether the
+fault is there. To add one, write a function and add it to `TESTS`.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,13 +13,13 @@ from radarize.pipeline.check.finding import Finding
 
 
 class Test(NamedTuple):
-    """A test.
+    """A test of a check.
 
     Attributes:
-        find: the test.
-        kinds: of faults that it finds.
-        unless: kinds that, once found, leave nothing for it to see.
-        whole: it looks at all frames, not at some.
+        find: the test function.
+        kinds: kinds of faults that it finds.
+        unless: kinds of faults after which the test is skipped.
+        whole: it examines all frames instead of some.
     """
 
     find: Callable[[Evidence], Iterator[Finding]]
@@ -40,7 +40,7 @@ TESTS = (
     Test(levels.scaled, ("samples scaled",)),
     Test(
         levels.receivers,
-        ("receiver dead", "receiver saturated", "channels alike", "receiver copied", "transmitter copied"),
+        ("receiver dead", "receiver saturated", "channels identical", "receiver copied", "transmitter copied"),
     ),
     Test(levels.transmitters, ("transmitter dead",)),
     Test(stamps.bursts, ("stamps too dense",)),
@@ -61,5 +61,5 @@ TESTS = (
     Test(orientation.elevation_mirrored, ("elevation mirrored",), unless=(*STILL, "upside down")),
     Test(orientation.backwards, ("facing backwards",), unless=STILL),
 )
-#: Kinds of faults, and what no radar recording shows on its own.
+#: All kinds of faults.
 FAULTS = tuple(dict.fromkeys(kind for test in TESTS for kind in test.kinds))

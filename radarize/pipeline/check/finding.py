@@ -1,4 +1,4 @@
-"""What a check finds, and what it cannot find."""
+"""A fault that a check found, its correction, and why a fault is not observable."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,15 +11,15 @@ from radarize.radar.config import RadarConfig
 
 
 @dataclass(frozen=True)
-class Mending:
-    """What turns wrong samples into right ones, without losing any.
+class Correction:
+    """A lossless change of samples or configuration that corrects a fault.
 
     Attributes:
-        config: of the radar as it should be; None: as it is.
-        samples: called with frames (frame, loop, tx, rx, sample, 2), returns as many of the same kind.
-        order: which frames stay, in their order; None: all as they are.
-        keeps_stamps: the frames are put to the stamps that are there, one after the other, rather than keep their own.
-        period: s: stamps are counted anew from the first one, so far apart; None: as they are.
+        config: corrected configuration of the radar; None: unchanged.
+        samples: function of frames (frame, loop, tx, rx, sample, 2) that returns the corrected ones; None: unchanged.
+        order: numbers of the frames to keep, in the corrected order; None: unchanged.
+        keeps_stamps: the reordered frames take the existing stamps in order instead of keeping their own.
+        period: s, frame period with which stamps are counted from the first one; None: unchanged.
     """
 
     config: RadarConfig | None = None
@@ -34,31 +34,31 @@ class Finding:
     """A fault of a recording.
 
     Attributes:
-        kind: which one, a key of `radarize.pipeline.check.faults.FAULTS`.
+        kind: kind of the fault, one of `radarize.pipeline.check.faults.FAULTS`.
         measured: what was measured, with units.
-        sure: how sure it is, 0 to 1.
-        remedy: which option or change mends it.
-        mending: how a corrected recording is written; None where none can be.
-        hides: nothing that comes after it in the samples can be judged unless it is mended.
+        sure: confidence, 0 to 1.
+        remedy: option or change that corrects it.
+        correction: correction to write; None if there is none.
+        hides: later tests cannot judge the samples unless it is corrected.
     """
 
     kind: str
     measured: str
     sure: float
     remedy: str
-    mending: Mending | None = field(default=None, compare=False, repr=False)
+    correction: Correction | None = field(default=None, compare=False, repr=False)
     hides: bool = False
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.measured} ({self.sure:.0%} sure); {self.remedy}"
 
     def row(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the finding as a dictionary for JSON."""
         return {
             "kind": self.kind, "measured": self.measured, "sure": round(self.sure, 3), "remedy": self.remedy,
-            "mendable": self.mending is not None,
+            "correctable": self.correction is not None,
         }  # fmt: skip
 
 
 class NotObservable(Exception):
-    """A recording does not show whether a fault is there; the message says why."""
+    """A recording does not show whether a fault is there; the message is the reason."""

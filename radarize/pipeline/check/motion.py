@@ -1,4 +1,4 @@
-"""How the radar moves, as far as a check needs it: velocity and turn at some places of a recording."""
+"""Motion of the radar for the tests of a check: velocity and yaw rate at some places of a recording."""
 
 from typing import NamedTuple
 
@@ -9,19 +9,19 @@ from radarize.pipeline.check.planewaves import PlaneWaves
 from radarize.pipeline.check.tracks import Tracks
 from radarize.signal.snapshots import Snapshots
 
-#: Purity of cells that are used; m/s by which an echo may miss a velocity; echoes that must agree; pairs for a turn.
+#: Minimum purity of cells; m/s, residual up to which an echo agrees with a velocity; agreeing echoes; pairs for a turn.
 _PURE, _OFF, _AGREE, _PAIRS = 0.8, 0.12, 8, 6
-#: Pairs of echoes that are tried.
+#: Pairs of echoes that RANSAC tries.
 _TRIED = 150
 
 
 class Motions(NamedTuple):
-    """Motion by place; what is not known is nan.
+    """Motion at each place; unknown values are nan.
 
     Attributes:
-        time: s, of each place.
+        time: s, time of each place.
         velocity: m/s, in the sensor's frame: forward, left, up.
-        turn: rad/s, positive to the left.
+        turn: rad/s, yaw rate, positive to the left.
     """
 
     time: Float[np.ndarray, "place"]
@@ -30,9 +30,10 @@ class Motions(NamedTuple):
 
 
 def find_motions(cells: Snapshots, waves: PlaneWaves, tracks: Tracks, times: Float[np.ndarray, "frame"]) -> Motions:
-    """Motion in each run of consecutive frames.
+    """Estimate the motion in each run of consecutive frames.
 
-    Velocity by RANSAC and least squares over closing speeds v . u. A turn is what bearings change beyond the parallax.
+    Velocity comes from RANSAC and least squares over closing speeds v . u, yaw rate from changes of bearings beyond
+    parallax.
     """
     frames = np.unique(cells.frame)
     runs = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1) if len(frames) else []

@@ -1,4 +1,4 @@
-"""How well echoes are plane waves over an array, if its antennas stand where somebody supposes."""
+"""How well echoes fit plane waves over an array, for a supposed assignment of antennas."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -11,20 +11,20 @@ from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 from radarize.signal.snapshots import Snapshots
 
-#: Rounds in which the channels' phases are estimated, from cells that are a single echo to this degree.
+#: Rounds in which the phases of the channels are estimated, and minimum purity of the cells used.
 _ROUNDS, _PURE = 2, 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What each channel of the samples is supposed to be.
+    """Supposed antennas of the channels.
 
     Attributes:
         places: (left, up) of the virtual antennas, half wavelengths.
-        sign: of the channels, of norm 1.
+        sign: signs of the channels, of magnitude 1.
         delay: s, from a loop's start to each transmitter's chirp.
         wavelength: m.
-        spacing: half wavelengths at the design frequency in half wavelengths of the signal.
+        spacing: ratio of half wavelengths at the design frequency to those of the signal.
     """
 
     places: Float[np.ndarray, "tx rx 2"]
@@ -37,12 +37,12 @@ class Reading:
     def of(
         cls, config: RadarConfig, tx: tuple[int, ...] = (), rx: tuple[int, ...] = (), moved: bool = False
     ) -> "Reading":
-        """As a configuration has it, but for axes whose places hold other antennas.
+        """Return the antennas of a configuration, with some exchanged.
 
         Args:
-            tx: place on the transmitters' axis of what stands at each place; empty: as configured.
-            rx: the same of receivers.
-            moved: the chirps' times were exchanged with the transmitters; else the order of firing is another one.
+            tx: index of the transmitter at each place of the axis; empty: as configured.
+            rx: the same for receivers.
+            moved: the times of chirps were exchanged with the transmitters; else the firing order differs.
         """
         out, back = layout(config)
         tx, rx = tx or tuple(range(len(config.tx))), rx or tuple(range(len(config.rx)))
@@ -57,12 +57,12 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class PlaneWaves:
-    """Echoes as plane waves.
+    """Echoes as plane waves over an array.
 
     Attributes:
         purity: share of a cell's power that one plane wave explains, 0 to 1.
-        direction: direction cosines of these to the left and up.
-        phases: rad, of the channels, by which a plane wave misses them on average, taken off already.
+        direction: direction cosines of the waves to the left and up.
+        phases: rad, mean phase errors of the channels, already subtracted.
     """
 
     purity: Float[np.ndarray, "cell"]

@@ -1,24 +1,24 @@
-"""Faults of the frames' times: impossible or unlike the configuration, frames and chirps that never came."""
+"""Faults of time stamps: impossible or contradicting the configuration; missing frames and chirps."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from radarize.pipeline.check.evidence import Evidence
-from radarize.pipeline.check.finding import Finding, Mending, NotObservable
+from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.tracks import range_rate_factor
 from radarize.radar.numbering import Numbering
 
-#: Share by which the stamps' step may differ from the frame period; and range's rate from Doppler, standard deviations
-#: and share: chirps are known to 1e-5, and ranges from bins of some cm.
+#: Share by which the step of stamps may differ from the frame period; for range rate over Doppler, the share and number
+#: of standard deviations: chirps are known to 1e-5, and ranges are measured in bins of some cm.
 _STEP, _RATE, _SIGMAS = 0.03, 0.08, 5.0
-#: Share of chirps or frames that may be lost without a word.
+#: Share of chirps or frames that may be lost without a finding.
 _LOST = 0.0
 
 
 def bursts(evidence: Evidence) -> Iterator[Finding]:
-    """Frames follow each other faster than one can be measured."""
+    """Find stamps closer to each other than a burst takes."""
     config, steps = evidence.config, _steps(evidence)
     short = steps < 0.9 * config.burst_time
     if short.mean() > 0.01:
@@ -26,35 +26,35 @@ def bursts(evidence: Evidence) -> Iterator[Finding]:
             "stamps too dense", f"{short.mean():.0%} of the frames begin {_time(float(np.median(steps[short])))} after "
             f"the one before, but a burst takes {_time(config.burst_time)}", 1.0,
             f"count stamps from the frame period, {_time(config.frame_period)}",
-            Mending(period=config.frame_period), hides=True,
+            Correction(period=config.frame_period), hides=True,
         )  # fmt: skip
 
 
 def period(evidence: Evidence) -> Iterator[Finding]:
-    """Stamps have another step than the frame period."""
+    """Find stamps with another step than the frame period."""
     config = evidence.config
     step = float(np.median(_steps(evidence)))
     if abs(step / config.frame_period - 1) < _STEP:
         return
     measured = f"stamps are {_time(step)} apart, the configured frame period is {_time(config.frame_period)}"
-    remedy, mending = "look which of them is right: --frame-period", None
+    remedy, correction = "check which of them is correct (--frame-period)", None
     try:
         by_stamps = range_rate_factor(evidence.tracks, evidence.times).value
         by_period = by_stamps * step / config.frame_period
         if abs(abs(by_stamps) - 1) < 0.1:
-            measured += f"; ranges change {abs(by_stamps):.2f} times as fast as Doppler says by the stamps"
+            measured += f"; ranges change {abs(by_stamps):.2f} times as fast as Doppler predicts with the stamps"
             remedy = f"set the frame period to {_time(step)} (--frame-period)"
-            mending = Mending(config.model_copy(update={"frame_period": step}))
+            correction = Correction(config.model_copy(update={"frame_period": step}))
         elif abs(abs(by_period) - 1) < 0.1:
-            measured += f"; ranges change {abs(by_period):.2f} times as fast as Doppler says by the configuration"
-            remedy, mending = "count stamps from the frame period", Mending(period=config.frame_period)
+            measured += f"; ranges change {abs(by_period):.2f} times as fast as Doppler predicts with the configuration"
+            remedy, correction = "count stamps from the frame period", Correction(period=config.frame_period)
     except NotObservable:
         pass
-    yield Finding("frame period", measured, sureness(abs(step / config.frame_period - 1), _STEP), remedy, mending)
+    yield Finding("frame period", measured, sureness(abs(step / config.frame_period - 1), _STEP), remedy, correction)
 
 
 def missing(evidence: Evidence) -> Iterator[Finding]:
-    """Stamps have gaps, or chirps never arrived."""
+    """Find gaps in the stamps, and chirps that never arrived."""
     config = evidence.config
     if len(evidence) > 1:
         step = float(np.median(_steps(evidence)))
@@ -62,27 +62,27 @@ def missing(evidence: Evidence) -> Iterator[Finding]:
         numbering.of(evidence.times)
         if numbering.missing:
             yield Finding(
-                "frames missing", f"{numbering.missing} frames between {len(evidence)} others never came", 1.0,
-                "look at the cable, at the packet delay, and at what else the computer does",
+                "frames missing", f"{numbering.missing} frames are missing between {len(evidence)} others", 1.0,
+                "check the cable, the packet delay, and the load of the computer",
             )  # fmt: skip
     lost = 1 - float(evidence.valid.mean()) if evidence.valid.size else 0.0
     if lost > _LOST:
         yield Finding(
-            "chirps lost", f"{lost:.2%} of the chirps lost samples on their way", 1.0,
-            "look at the cable, at the packet delay, and at what else the computer does",
+            "chirps lost", f"{lost:.2%} of the chirps lost samples in transmission", 1.0,
+            "check the cable, the packet delay, and the load of the computer",
         )  # fmt: skip
 
 
 def chirps(evidence: Evidence) -> Iterator[Finding]:
-    """Ranges change faster or more slowly than Doppler says."""
+    """Find range rates that differ from Doppler speeds by a factor."""
     factor = range_rate_factor(evidence.tracks, evidence.times)
     off = abs(abs(factor.value) - 1)
     if off > max(_RATE, _SIGMAS * factor.error):
         yield Finding(
             "chirp parameters",
-            f"ranges change {abs(factor.value):.2f} +- {factor.error:.2f} times as fast as Doppler says",
+            f"ranges change {abs(factor.value):.2f} +- {factor.error:.2f} times as fast as Doppler predicts",
             sureness(off / max(_RATE, _SIGMAS * factor.error), 1.0),
-            "look at slope and sample rate (range) and at idle and ramp-end time (speed) of the profile",
+            "check slope and sample rate (range), and idle and ramp-end time (speed) of the profile",
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""All frames of a recording in short, so that their order can be judged."""
+"""Compact summary of all frames of a recording, to check their order."""
 
 from typing import NamedTuple
 from zlib import crc32
@@ -10,17 +10,17 @@ from jaxtyping import Bool, Float32, Int, Int16
 from radarize.radar.config import RadarConfig
 from radarize.signal.snapshots import NEAREST
 
-#: Loops of a frame that its look takes one of.
+#: The summary uses every N-th loop of a frame.
 _EVERY = 8
 
 
 class Sequence(NamedTuple):
-    """All frames in short.
+    """Summary of all frames.
 
     Attributes:
         digest: CRC-32 of the samples.
-        silent: no sample differs from zero.
-        looks: logarithm of power over range beyond the leakage and over beams, less its mean over all frames, of
+        silent: whether all samples are zero.
+        looks: logarithm of power over range (beyond leakage) and beams, minus its mean over all frames, normalised to
             norm 1.
     """
 
@@ -30,10 +30,10 @@ class Sequence(NamedTuple):
 
 
 class Summary:
-    """Takes in frames, 0.2 ms each, and keeps 0.7 kB of each.
+    """Summarises frames as they are read: 0.2 ms and 0.7 kB per frame.
 
     Args:
-        config: of the radar.
+        config: configuration of the radar.
     """
 
     def __init__(self, config: RadarConfig):
@@ -44,18 +44,18 @@ class Summary:
         self._looks: list[np.ndarray] = []
 
     def add(self, frames: Int16[np.ndarray, "frame loop tx rx sample 2"]) -> None:
-        """Take in the next frames."""
+        """Add the next frames."""
         self._digests += [crc32(frame.tobytes()) for frame in frames]
         self._silent += [not frame.any() for frame in frames]
         some = np.ascontiguousarray(frames[:, ::_EVERY], np.float32).view(np.complex64)[..., 0]
         beams = scipy.fft.fft(scipy.fft.fft(some * self._window, axis=-1)[..., self._first : -2], axis=3)
-        # The median over chirps, for interference and lost ones have no say.
+        # The median over chirps is not affected by interference and lost chirps.
         power = np.median(np.square(np.abs(beams)), axis=(1, 2))  # (frame, beam, range)
         self._looks.append(np.log(power.reshape(len(frames), -1) + np.float32(1e-3)).astype(np.float16))
 
     @property
     def sequence(self) -> Sequence:
-        """Of all frames so far."""
+        """Summary of all frames so far."""
         looks = np.concatenate(self._looks).astype(np.float32) if self._looks else np.zeros((0, 1), np.float32)
         silent = np.array(self._silent, bool)
         looks = looks - (looks[~silent].mean(axis=0) if (~silent).any() else 0)

@@ -1,8 +1,8 @@
-"""Echoes met again in the next frames: by how far they came nearer, and at which Doppler speed.
+"""Echoes that are found again in the next frames: change of range, and Doppler speed.
 
-The range of an echo of a static world falls by its closing speed times the time that passed. Range comes from the beat
-frequency and the clock's stamps, speed from the phase between chirps: if chirps, stamps or the order of frames are not
-what the configuration says, the two disagree by a factor.
+The range of an echo of a static world decreases by its closing speed times the time that passed. Range comes from the
+beat frequency and the clock's stamps, speed from the phase between chirps: if chirps, stamps or the order of frames
+differ from the configuration, the two disagree by a factor.
 """
 
 from typing import NamedTuple
@@ -14,12 +14,13 @@ from radarize.pipeline.check.finding import NotObservable
 from radarize.pipeline.check.planewaves import PlaneWaves
 from radarize.signal.snapshots import Snapshots
 
-#: Frames apart, at most; coherence of the channels of two cells that may be the same echo; m/s and m by which they may
-#: differ.
+#: Maximum number of frames between two cells of an echo; minimum coherence of their channels; m/s and m by which they
+#: may differ.
 _APART, _COHERENT, _SPEED, _RANGE = 3, 0.9, 0.15, 0.3
-#: m: width of a vote; factors that are tried; votes above what any factor gets by chance.
+#: m, width of a vote; factors that are tried.
 _WIDTH, _FACTORS = 0.006, np.linspace(-4.0, 4.0, 1601)
-#: m/s: slower echoes say nothing of the factor. Pairs and excess of votes over the median factor that are needed.
+#: m/s, minimum speed of echoes that vote; minimum number of pairs; minimum ratio of votes to those of the median
+#: factor.
 _SLOW, _PAIRS, _EXCESS = 0.1, 60, 1.5
 
 
@@ -27,12 +28,12 @@ class Tracks(NamedTuple):
     """Pairs of cells that may be the same echo.
 
     Attributes:
-        first, second: frames.
-        nearer: m, by how much the range fell.
+        first, second: numbers of the frames.
+        nearer: m, decrease of range.
         speed: m/s, closing, mean of both.
         range: m.
         bearings: direction cosines to the left in both frames.
-        pure: both are single plane waves.
+        pure: whether both are single plane waves.
     """
 
     first: Int[np.ndarray, "pair"]
@@ -45,7 +46,7 @@ class Tracks(NamedTuple):
 
 
 def find_tracks(cells: Snapshots, waves: PlaneWaves | None) -> Tracks:
-    """Pair cells of frames up to three apart whose channels are alike."""
+    """Pair cells of frames up to three apart whose channels are coherent."""
     flat = cells.channels.reshape(len(cells.speed), -1)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-30)
     frames = np.unique(cells.frame)
@@ -56,10 +57,10 @@ def find_tracks(cells: Snapshots, waves: PlaneWaves | None) -> Tracks:
             if (later := members.get(frame + apart)) is None:
                 continue
             here = members[frame]
-            alike = np.abs(flat[here].conj() @ flat[later].T) > _COHERENT
-            alike &= np.abs(cells.speed[here][:, None] - cells.speed[later]) < _SPEED
-            alike &= np.abs(cells.range[here][:, None] - cells.range[later]) < _RANGE
-            i, j = np.nonzero(alike)
+            same = np.abs(flat[here].conj() @ flat[later].T) > _COHERENT
+            same &= np.abs(cells.speed[here][:, None] - cells.speed[later]) < _SPEED
+            same &= np.abs(cells.range[here][:, None] - cells.range[later]) < _RANGE
+            i, j = np.nonzero(same)
             ones.append(here[i])
             others.append(later[j])
     a, b = np.concatenate(ones), np.concatenate(others)
@@ -72,7 +73,7 @@ def find_tracks(cells: Snapshots, waves: PlaneWaves | None) -> Tracks:
 
 
 class Factor(NamedTuple):
-    """By what factor ranges change faster than Doppler says, and how well that is known."""
+    """Ratio of range rate to Doppler speed, with its standard error and the votes for it."""
 
     value: float
     error: float
@@ -80,26 +81,26 @@ class Factor(NamedTuple):
 
 
 def range_rate_factor(tracks: Tracks, times: Float[np.ndarray, "frame"]) -> Factor:
-    """Rate of range over Doppler speed, by vote: pairs that are no same echo spread over all factors.
+    """Estimate the ratio of range rate to Doppler speed by vote; pairs of different echoes spread over all factors.
 
     Args:
-        times: of all frames, s.
+        times: times of all frames, s.
 
     Raises:
         NotObservable: too few echoes move, or no factor stands out.
     """
     moving = np.abs(tracks.speed) > _SLOW
     if moving.sum() < _PAIRS:
-        raise NotObservable(f"{moving.sum()} echoes are followed that move, {_PAIRS} are needed")
+        raise NotObservable(f"{moving.sum()} moving echoes are tracked, {_PAIRS} are needed")
     expected = (tracks.speed * (times[tracks.second] - times[tracks.first]))[moving]
     nearer = tracks.nearer[moving]
     votes = np.exp(-np.square((nearer - _FACTORS[:, None] * expected) / _WIDTH) / 2).sum(axis=1)
-    # Where nothing moves relative to the frames' step, the factor zero wins: it is as much as chance has there.
+    # If nothing moves relative to the frames' step, the factor zero wins, at the level of chance.
     best = int(votes.argmax())
     if votes[best] < _EXCESS * np.median(votes):
-        raise NotObservable("echoes do not come nearer by any multiple of their Doppler speed")
+        raise NotObservable("ranges change by no common multiple of Doppler speeds")
     value = _FACTORS[best]
-    for _ in range(5):  # least squares of those that agree
+    for _ in range(5):  # least squares over agreeing pairs
         off = nearer - value * expected
         weight = np.exp(-np.square(off / _WIDTH) / 2)
         value = float((weight * nearer * expected).sum() / max((weight * expected**2).sum(), 1e-30))

@@ -1,12 +1,12 @@
-"""The run folder: what the pipeline, or SLAM on plain files, made of its input, written and read here alone.
+"""The run folder: the result of the pipeline, or of SLAM on plain files. Only this package writes and reads it.
 
-trajectory.tum        poses after SLAM; a folder that has it is whole
+trajectory.tum        poses after SLAM; written last, so a folder that has it is complete
 odometry.tum          poses of odometry alone
 reference.tum         true poses, where they are known
 map.pgm, map.yaml     occupancy, as ROS map_server reads it
-scans.h5              scans and velocities, what is true of them, heat maps of a few frames (`SHAPES`)
+scans.h5              scans and velocities, truth of them, heat maps of some frames (`SHAPES`)
 run.json              recording, methods, settings, versions, timings
-metrics.json          figures against the truth, once `radarize evaluate` has made them
+metrics.json          errors against the truth, written by `radarize evaluate`
 """
 
 from radarize.pipeline.runfolder.occupancy import OccupancyMap

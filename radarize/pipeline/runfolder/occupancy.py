@@ -1,4 +1,4 @@
-"""ROS maps: a picture (.pgm) and the .yaml that says what it means (http://wiki.ros.org/map_server).
+"""ROS maps: an image (.pgm) and its description (.yaml), as in http://wiki.ros.org/map_server.
 
 A pixel is occupied with probability p = (255 - value) / 255, or value / 255 if `negate`; above ``occupied_thresh`` it
 counts as occupied, below ``free_thresh`` as free, between them as unknown. Row 0 is the top; ``origin`` is x, y, yaw of
@@ -19,7 +19,7 @@ from radarize.io.canvas import axes_or_new, png
 from radarize.io.errors import InputError
 from radarize.io.files import read_bytes
 from radarize.io.pixels import MOST_PIXELS
-from radarize.io.plain import complaint
+from radarize.io.plain import format_validation_error
 from radarize.io.pose import transform
 from radarize.io.replacing import replacing
 from radarize.io.yamlfile import read_yaml
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-#: Bytes of a description, and of a picture's header, comments included.
+#: Maximum bytes of a description, and of an image's header with its comments.
 _DESCRIPTION, _HEADER = 16 << 10, 4 << 10
 _PICTURE = MOST_PIXELS + _HEADER
-#: Of an 8-bit PGM: width and height, with comments between the words, and one space before the pixels.
+#: Header of an 8-bit PGM: width and height, with comments between them, and one space before the pixels.
 _PGM = re.compile(rb"P5~(\d{1,9})~(\d{1,9})~255\s".replace(b"~", rb"(?:\s|#[^\n]*\n)+"))
 
 
 class MapFile(BaseModel):
-    """The keys of a map's .yaml; others are ignored."""
+    """Keys of a map's .yaml; others are ignored."""
 
     image: str
     resolution: Annotated[float, Field(gt=0, le=1)]
@@ -49,23 +49,23 @@ class MapFile(BaseModel):
 
     @classmethod
     def read(cls, path: Path) -> "MapFile":
-        """From a file.
+        """Read the description from a file.
 
         Raises:
-            InputError: it is missing or unreadable, or a key is, with its value.
+            InputError: the file is missing or unreadable, or a key is missing or has a wrong value.
         """
         try:
             return cls.model_validate(read_yaml(path, _DESCRIPTION))
         except ValidationError as error:
-            raise InputError(f"{path}: {complaint(error)}") from error
+            raise InputError(f"{path}: {format_validation_error(error)}") from error
 
 
 @dataclass(frozen=True)
 class OccupancyMap:
-    """A map as it lies in its files.
+    """An occupancy map as stored in its files.
 
     Attributes:
-        about: its description.
+        about: description (resolution, origin, thresholds).
         pixels: grey values, first row at the top (largest y).
     """
 
@@ -74,7 +74,7 @@ class OccupancyMap:
 
     @classmethod
     def read(cls, description: Path) -> "OccupancyMap":
-        """A map from its ``.yaml`` and the picture beside it.
+        """Read a map from its ``.yaml`` and the image beside it.
 
         Raises:
             InputError: a file is missing or malformed; names file and field.
@@ -86,18 +86,18 @@ class OccupancyMap:
 
     @classmethod
     def of(cls, grid: OccupancyGrid) -> "OccupancyMap":
-        """A map of SLAM's, to be saved."""
+        """Return the map of a SLAM grid, to be saved."""
         origin = (*grid.origin.round(6).tolist(), 0.0)
         return cls(MapFile(image="map.pgm", resolution=grid.resolution, origin=origin), grid.image())
 
     @property
     def resolution(self) -> float:
-        """m per cell."""
+        """Side of a cell, m."""
         return self.about.resolution
 
     @property
     def origin(self) -> tuple[float, float, float]:
-        """(x, y, yaw) of the lower left corner in the map's frame, m and rad."""
+        """Pose (x, y, yaw) of the lower left corner in the map's frame, m and rad."""
         return self.about.origin
 
     @property
@@ -117,13 +117,13 @@ class OccupancyMap:
         return (values if self.about.negate else 255 - values) / 255
 
     def centers(self, cells: Bool[np.ndarray, "row column"]) -> Float[np.ndarray, "cell 2"]:
-        """Middles of the chosen cells in the map's frame, m."""
+        """Return the centres of the chosen cells in the map's frame, m."""
         row, column = np.nonzero(cells)
         inside = np.column_stack([column + 0.5, len(self.pixels) - row - 0.5]) * self.resolution
         return transform(np.array(self.origin), inside)
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
-        """Draw it, in m in its own axes (`origin` without the yaw)."""
+        """Draw the map, in m on its own axes (`origin` without the yaw)."""
         axes = axes_or_new(axes)
         (left, low, _), (rows, columns) = self.origin, self.pixels.shape
         extent = (left, left + columns * self.resolution, low, low + rows * self.resolution)
@@ -135,7 +135,7 @@ class OccupancyMap:
         return png(self.plot)
 
     def save(self, description: Path) -> Path:
-        """Write it as ``NAME.yaml`` and ``NAME.pgm``, as ROS map_server reads them.
+        """Write the map as ``NAME.yaml`` and ``NAME.pgm``, as ROS map_server reads them.
 
         Raises:
             InputError: a file cannot be written.
@@ -150,7 +150,7 @@ class OccupancyMap:
 
 
 def read_pgm(path: Path) -> UInt8[np.ndarray, "row column"]:
-    """Pixels of a binary 8-bit PGM (``P5``).
+    """Read the pixels of a binary 8-bit PGM (``P5``).
 
     Raises:
         InputError: not such a file, or cut short.

@@ -1,5 +1,5 @@
-"""Reading a run folder, whatever became of it: a damaged file is one sentence, and takes no memory that it has not the
-size for."""
+"""Reader of a run folder. A damaged file raises one sentence, and cannot make it allocate more memory than the file has
+bytes."""
 
 import json
 from collections.abc import Collection, Iterator, Mapping
@@ -17,7 +17,7 @@ from radarize.io.errors import InputError, explained
 from radarize.io.files import regular
 from radarize.io.hdf5 import dataset, open_hdf5
 from radarize.io.jsonfile import read_json
-from radarize.io.plain import complaint
+from radarize.io.plain import format_validation_error
 from radarize.io.replacing import write_whole
 from radarize.io.tum import read_tum
 from radarize.odometry.observability import UnobservableSpans
@@ -27,7 +27,7 @@ from radarize.pipeline.runfolder.occupancy import OccupancyMap
 
 #: Times (s) and poses (position m, quaternion x y z w).
 Poses = tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]
-#: Data sets of ``scans.h5``: lengths of their axes by name, alike wherever the name is; "2+" is two or more.
+#: Data sets of ``scans.h5``: names of their axes; axes of the same name have equal length; "2+" is two or more.
 SHAPES = {
     "time": "scan",
     "azimuths": "beam",
@@ -56,23 +56,25 @@ SHAPES = {
     "heatmaps/elevation_aware": "picture range azimuth",
     "heatmaps/doppler_azimuth": "picture speed azimuth",
 }
-#: Files of a run; the first is there in a whole one.
+#: Files of a run; a complete run has the first.
 FILES = (
     *("trajectory.tum", "odometry.tum", "reference.tum", "map.pgm", "map.yaml", "scans.h5", "run.json"),
     "metrics.json",
 )
 _NEEDED = ("time", "ranges", "azimuths")
-#: Those that say when and where the others are.
+#: Key of ``run.json`` for the spans in which the motion was unobservable.
+_SPANS = "blind"
+#: Data sets with the times and coordinates of the others.
 _AXES = ("time", "azimuths", "truth/scan_azimuths", "heatmaps/ranges", "heatmaps/azimuths", "heatmaps/velocities")
-#: Bytes that one of ``scans.h5`` may unpack to, and bytes that need not be there. Ours are not packed.
+#: Factor by which a data set of ``scans.h5`` may be compressed, and bytes that may be missing. Ours are not compressed.
 _PACKED, _AHEAD = 20, 1 << 20
 
 
 class RunFolder:
-    """A run folder for reading; every file is read when it is asked for, and once.
+    """Reader of a run folder; every file is read once, on first access.
 
     Raises:
-        InputError: it is no run folder, or not a whole one.
+        InputError: not a run folder, or an incomplete one.
     """
 
     def __init__(self, path: str | Path):
@@ -81,17 +83,17 @@ class RunFolder:
             raise InputError(f"{self.path}: has no trajectory.tum, expected a folder that radarize run wrote")
 
     def has(self, name: str) -> bool:
-        """Whether there is a file of this name."""
+        """Return whether there is a file of this name."""
         return (self.path / name).is_file()
 
     @cached_property
     def facts(self) -> dict[str, object]:
-        """What ``run.json`` says; empty without."""
+        """Content of ``run.json``; empty without it."""
         return read_json(self.path / "run.json")
 
     @property
     def methods(self) -> dict[str, str]:
-        """Methods by what they are for (``odometry``, ``scans``); empty if unknown.
+        """Names of the methods, with keys ``odometry`` and ``scans``; empty if unknown.
 
         Raises:
             InputError: ``run.json`` is damaged.
@@ -103,10 +105,10 @@ class RunFolder:
 
     @property
     def warnings(self) -> list[str]:
-        """What ``run.json`` warns of.
+        """Warnings in ``run.json``.
 
         Raises:
-            InputError: it is damaged.
+            InputError: ``run.json`` is damaged.
         """
         found = self.facts.get("warnings", [])
         if not isinstance(found, list):
@@ -114,18 +116,18 @@ class RunFolder:
         return [str(words) for words in found]
 
     @property
-    def blind(self) -> UnobservableSpans | None:
-        """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
+    def unobservable_spans(self) -> UnobservableSpans | None:
+        """Spans in which odometry could not observe the motion, s since the first pose; None if ``run.json`` has none.
 
         Raises:
-            InputError: it says something else.
+            InputError: the entry is malformed.
         """
-        if "blind" not in self.facts:
+        if _SPANS not in self.facts:
             return None
         try:
-            found = UnobservableSpans.model_validate(self.facts["blind"])
+            found = UnobservableSpans.model_validate(self.facts[_SPANS])
         except ValidationError as error:
-            raise InputError(f"{self.path / 'run.json'}: blind.{complaint(error)}") from error
+            raise InputError(f"{self.path / 'run.json'}: {_SPANS}.{format_validation_error(error)}") from error
         start = float(self.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
@@ -133,15 +135,15 @@ class RunFolder:
 
     @property
     def health(self) -> list[Condition]:
-        """Where odometry had a hard time, in s since the first pose; empty where ``run.json`` does not say.
+        """Conditions that degraded odometry, s since the first pose; empty if ``run.json`` has none.
 
         Raises:
-            InputError: it says something else.
+            InputError: the entry is malformed.
         """
         try:
             found = TypeAdapter(list[Condition]).validate_python(self.facts.get("health", []))
         except ValidationError as error:
-            raise InputError(f"{self.path / 'run.json'}: health.{complaint(error)}") from error
+            raise InputError(f"{self.path / 'run.json'}: health.{format_validation_error(error)}") from error
         start = float(self.trajectory[0][0])
         for each in found:
             each.start_s, each.stop_s = each.start_s - start, each.stop_s - start
@@ -149,12 +151,12 @@ class RunFolder:
 
     @cached_property
     def trajectory(self) -> Poses:
-        """Of SLAM."""
+        """Poses of SLAM."""
         return read_tum(self.path / "trajectory.tum")
 
     @cached_property
     def odometry(self) -> Poses | None:
-        """Of odometry; None without."""
+        """Poses of odometry; None without odometry."""
         return self._poses("odometry.tum")
 
     @cached_property
@@ -167,23 +169,23 @@ class RunFolder:
 
     @cached_property
     def scans(self) -> "Scans":
-        """Data sets of ``scans.h5``; none without."""
+        """Data sets of ``scans.h5``; empty without it."""
         return Scans(self.path / "scans.h5") if self.has("scans.h5") else Scans()
 
     @cached_property
     def errors(self) -> ErrorModel | None:
-        """Of odometry, of every scan; None where they are not known."""
+        """Error model of odometry at every scan; None if unknown."""
         names = [f"errors/{each.name}" for each in fields(ErrorModel)]
         return ErrorModel(*(self.scans[name] for name in names)) if self.scans.keys() >= {*names} else None
 
     @cached_property
     def map(self) -> OccupancyMap | None:
-        """Of SLAM; None without."""
+        """Map of SLAM; None without it."""
         return OccupancyMap.read(self.path / "map.yaml") if self.has("map.yaml") else None
 
     @property
     def metrics(self) -> dict[str, object]:
-        """What ``metrics.json`` says; empty without."""
+        """Content of ``metrics.json``; empty without it."""
         return read_json(self.path / "metrics.json")
 
     def write_metrics(self, metrics: Mapping[str, object]) -> None:
@@ -196,14 +198,14 @@ class RunFolder:
 
 
 class Scans(Mapping[str, np.ndarray]):
-    """Data sets of a run's ``scans.h5`` by path, each read when it is asked for.
+    """Data sets of a run's ``scans.h5`` by path, each read on first access.
 
     Args:
-        path: the file; None for a run without.
+        path: the file; None for a run without scans.
 
     Raises:
-        InputError: unreadable, without times, ranges and azimuths, or with data sets that do not fit each other or say
-            that they hold more than the file does.
+        InputError: unreadable, without times, ranges and azimuths, or with data sets that do not fit each other or
+            that declare more bytes than the file has.
     """
 
     def __init__(self, path: Path | None = None):
@@ -218,7 +220,7 @@ class Scans(Mapping[str, np.ndarray]):
             for name in _NEEDED:
                 if name not in self._names:
                     raise InputError(f"{path}: has no /{name}, expected /time, /ranges and /azimuths")
-            # Axes are as long as the data sets in the order above say that come first.
+            # The length of an axis is that of the first data set in the order above that has it.
             for name in [name for name in SHAPES if name in self._names]:
                 self._check(name, dataset(file, name, path, _PACKED, _AHEAD))
 
@@ -242,7 +244,7 @@ class Scans(Mapping[str, np.ndarray]):
         return len(self._names)
 
     def copy(self, file: h5py.File, without: Collection[str]) -> None:
-        """Copy the data sets into another file, but for some."""
+        """Copy the data sets into another file, except for some."""
         with self._open() as source:
             for name in self._names:
                 if name not in without:
@@ -255,7 +257,7 @@ class Scans(Mapping[str, np.ndarray]):
             yield file
 
     def _check(self, name: str, data: h5py.Dataset) -> None:
-        """Whether a data set has the axes that it should have, as long as others say that they are."""
+        """Raise InputError unless a data set has the expected axes, with the lengths that other data sets have."""
         axes = SHAPES[name].split()
         fits = len(axes) == data.ndim and data.dtype.kind != "c"
         for axis, length in zip(axes, data.shape, strict=False):
@@ -263,7 +265,7 @@ class Scans(Mapping[str, np.ndarray]):
                 fits &= length == int(axis[0]) or (axis.endswith("+") and length > int(axis[0]))
             else:
                 known = self._lengths.setdefault(axis, length)
-                # Truth that was written ahead of the last whole frame is cut.
+                # Truth that was written beyond the last complete frame is cut.
                 fits &= length == known or (axis == "scan" and name.startswith("truth/") and length > known)
         if not fits:
             expected = " x ".join(str(self._lengths.get(axis, axis)) for axis in axes)

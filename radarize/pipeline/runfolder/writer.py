@@ -1,5 +1,5 @@
-"""Writing a run folder while the pipeline goes: what a batch gave goes to disk at once, and the folder is whole or not
-there."""
+"""Writer of a run folder: each result is written as soon as it is computed, and the folder appears only when it is
+complete."""
 
 import errno
 import json
@@ -29,18 +29,18 @@ from radarize.signal.bearings import BEARINGS
 from radarize.signal.heatmaps import Heatmaps
 from radarize.slam.backend import Slam
 
-#: Truth of a recording that a run keeps.
+#: Truth of a recording that is copied into a run.
 _TRUTH = ("velocity", "scan", "scan_azimuths", "floor_plan", "pose", "time")
-#: Heat maps kept for the report, spread over the recording.
+#: Number of heat maps stored for the report, spread over the recording.
 _PICTURES = 6
-#: Bytes of a chunk of ``scans.h5``, frames of truth copied at a time, and bytes of disk to keep free for what HDF5
-#: writes where it reports no error.
+#: Bytes of a chunk of ``scans.h5``, frames of truth copied at a time, and bytes of disk that stay free because HDF5
+#: does not report all write errors.
 _CHUNK, _FRAMES, _RESERVE = 16 << 10, 1024, 1 << 20
 
 
 class RunWriter:
-    """A sink of the pipeline that writes a run folder; a context manager. What is not finished when it exits leaves
-    nothing behind, and a run that was there as it was.
+    """Context manager that writes the results of a pipeline to a run folder. Without `finish` nothing is left behind,
+    and an existing run stays as it was.
 
         with RunWriter(folder, radar) as writer:
             for result in pipeline.run(batches):
@@ -49,10 +49,10 @@ class RunWriter:
             writer.finish(pipeline.slam, facts)
 
     Args:
-        radar: configuration; None of a session that no radar's frames are added to.
+        radar: configuration; None for a session without radar frames.
 
     Attributes:
-        health: of the pipeline so far.
+        health: conditions that degraded odometry so far.
 
     Raises:
         InputError: the folder cannot be written.
@@ -81,7 +81,7 @@ class RunWriter:
             self._files.discard()
 
     def add(self, result: Result) -> None:
-        """Write what a batch gave."""
+        """Write the result of a batch."""
         track = result.track
         if not len(track.time):
             return
@@ -104,10 +104,11 @@ class RunWriter:
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
     def describe(self, frames: Clip, heatmaps: Heatmaps, warnings: Sequence[str] = ()) -> None:
-        """Say what frames the run is of, with what is true of them, and keep heat maps of some for reports.
+        """Set the frames that the run is made from, with their truth and warnings, and store heat maps of some for
+        reports.
 
         Args:
-            warnings: of the recording, which come first.
+            warnings: warnings of the recording, which come first.
 
         Raises:
             InputError: the recording is damaged.
@@ -116,15 +117,15 @@ class RunWriter:
         times, period, name = self._scans["time"], recording.config.frame_period, recording.path.name
         attributes = {k: v for k, v in recording.attributes.items() if isinstance(v, str | int | float)}
         centers = recording.times[[span.start, span.stop - 1]] + recording.config.burst_center
-        blindness = self.health.blindness
-        blindness.lost(float(centers[0]), float(times[0]))
-        blindness.lost(float(times[-1]), float(centers[1]))
+        observability = self.health.observability
+        observability.lost(float(centers[0]), float(times[0]))
+        observability.lost(float(times[-1]), float(centers[1]))
         self._facts |= {
             "recording": name,
             "recording_attributes": attributes,
             "frames": len(span),
             "duration_s": float(times[-1] - times[0] + period),
-            "blind": blindness.found.model_dump(),
+            "blind": observability.found.model_dump(),
             "health": [each.model_dump() for each in self.health.found],
             "warnings": [*recording.damage, *warnings, *self.health.warnings()],
             "radar": recording.config.model_dump(mode="json"),
@@ -171,11 +172,11 @@ class RunWriter:
         self.put("heatmaps/velocities", maps.velocities, "m/s, closing positive")
 
     def finish(self, slam: Slam, facts: Mapping[str, object]) -> Path:
-        """Write trajectory with its covariances, map and ``run.json`` of a finished session, and put the folder in
+        """Write trajectory with its covariances, map and ``run.json`` of a finished session, and move the folder into
         place.
 
         Raises:
-            InputError: something cannot be written.
+            InputError: a file cannot be written.
         """
         times, poses = slam.trajectory()
         self.write_poses("trajectory", (times, planar_poses(poses)))
@@ -200,12 +201,12 @@ class RunWriter:
 
     # --- pieces ------------------------------------------------------------------------------------------------------
     def put(self, name: str, data: Shaped[np.ndarray, "..."], unit: str) -> None:
-        """Write a whole data set of ``scans.h5``."""
+        """Write a complete data set of ``scans.h5``."""
         with self._writing(data.nbytes):
             self._scans.create_dataset(name, data=data).attrs["unit"] = unit
 
     def extend(self, name: str, rows: Shaped[np.ndarray, "row ..."], unit: str) -> None:
-        """Add rows to a data set of ``scans.h5``."""
+        """Append rows to a data set of ``scans.h5``."""
         with self._writing(rows.nbytes):
             if name not in self._scans:
                 shape, size = rows.shape[1:], max(rows.nbytes // max(len(rows), 1), 1)
@@ -217,18 +218,18 @@ class RunWriter:
             data[-len(rows) :] = rows
 
     def inherit(self, scans: Scans, without: tuple[str, ...]) -> None:
-        """Take over another run's data sets of ``scans.h5``, but for some."""
+        """Copy another run's data sets of ``scans.h5``, except for some."""
         with self._writing(scans.path.stat().st_size):
             scans.copy(self._scans, without)
 
     def write_poses(self, name: str, poses: Poses) -> None:
-        """Add poses to ``NAME.tum``."""
+        """Append poses to ``NAME.tum``."""
         with self._writing(), (self._files.part / f"{name}.tum").open("a") as file:
             write_poses(file, *poses)
 
     @contextmanager
     def _writing(self, size: int = 0) -> Iterator[None]:
-        """Turn what comes of writing into an InputError; refuses where the disk has no room for so many bytes."""
+        """Turn write errors into InputErrors; refuse if the disk has less than `size` bytes free."""
         with explained(f"{self.folder}: cannot be written", OSError, RuntimeError):
             if shutil.disk_usage(self._files.part).free < size + _RESERVE:
                 raise OSError(errno.ENOSPC, FULL)

@@ -1,8 +1,8 @@
-"""Boards: the antenna layout, the chip and the front end of each, in a YAML file of the board's name.
+"""Boards: antenna layout, chip and front end, each in a YAML file with the board's name.
 
-The files in this folder are `BOARDS`; a file elsewhere is given by its path wherever a board is named. The head of
-`iwr1843boost.yaml` says what such a file holds. Antennas are numbered as on the board, TX1 and RX1 first; a board has
-as many as its file lists.
+The files in this folder are `BOARDS`; other boards are given by the path of their file wherever a board is named.
+`iwr1843boost.yaml` documents the format. Antennas are numbered as on the board, TX1 and RX1 first; their number is that
+in the file.
 """
 
 import json
@@ -17,7 +17,7 @@ from jaxtyping import Int
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from radarize.io.errors import InputError
-from radarize.io.plain import Frozen, complaint
+from radarize.io.plain import Frozen, format_validation_error
 from radarize.io.yamlfile import read_yaml
 from radarize.radar.boards.chips import CHIPS
 
@@ -53,7 +53,7 @@ def _in_phase(antennas: tuple[Place, ...]) -> tuple[Sign, ...]:
 
 
 class Board(Frozen):
-    """A board.
+    """Radar board.
 
     Attributes:
         name: name of the board's file without suffix.
@@ -109,7 +109,7 @@ class Board(Frozen):
     @field_validator("front_end", mode="before")
     @classmethod
     def _as_json(cls, fields: object) -> object:
-        """As it comes back from a recording's JSON: keys are text, and whatever is no plain data is."""
+        """Restore values from a recording's JSON, in which keys are text."""
         try:
             return json.loads(json.dumps(fields, default=str))
         except TypeError as error:
@@ -122,7 +122,7 @@ class Board(Frozen):
 
     @property
     def nominal_calibration(self) -> tuple[tuple[float, float], ...]:
-        """Factor per physical (tx, rx) as (re, im) pairs that takes the channels' signs off again."""
+        """Factor per physical (tx, rx) as (re, im) pairs that removes the channels' signs."""
         return tuple((float(sign), 0.0) for sign in self.signs.ravel())
 
     @property
@@ -138,7 +138,7 @@ class Board(Frozen):
 
 
 class _Files(Mapping[str, Board]):
-    """The boards of this folder by name, read when asked for."""
+    """Boards of this folder by name, read on first use."""
 
     def __getitem__(self, name: str) -> Board:
         if name not in _names():
@@ -161,10 +161,10 @@ BOARDS: Mapping[str, Board] = _Files()
 
 
 def load_board(board: str | Path | Board) -> Board:
-    """A board by name, by the path of its file, or as it is given.
+    """Return a board by name, by the path of its file, or as it is given.
 
     Raises:
-        InputError: no such board or file, or a field that is missing, unknown or impossible.
+        InputError: unknown board or missing file, or a field that is missing, unknown or impossible.
     """
     if isinstance(board, Board):
         return board
@@ -178,29 +178,29 @@ def load_board(board: str | Path | Board) -> Board:
     try:
         return Board.model_validate({"name": Path(board).stem, **data})
     except ValidationError as error:
-        raise InputError(f"{board}: {complaint(error)}") from error
+        raise InputError(f"{board}: {format_validation_error(error)}") from error
 
 
 @cache
 def _read(name: str) -> Board:
-    return load_board(_FOLDER / f"{name}.yaml")  # a file that nobody changes
+    return load_board(_FOLDER / f"{name}.yaml")  # a file that does not change
 
 
 def expected() -> str:
-    """What may stand where a board is named."""
+    """Describe the accepted values of a board's name."""
     return f"one of {', '.join(BOARDS)}, or the path of a board's .yaml file"
 
 
 def named_board(device: str) -> str | None:
-    """The board that a device's or platform's name means (``xWR18xx``, ``IWR6843AOP``); None where it means none, or
-    one of several: a plain ``iwr6843`` may be on the ISK, the ODS or the AOP."""
+    """Return the board of a device's or platform's name (``xWR18xx``, ``IWR6843AOP``); None if it is unknown or
+    ambiguous: a plain ``iwr6843`` may be on the ISK, the ODS or the AOP."""
     word = _plain(device)
     found = (name for name, board in BOARDS.items() if word in map(_plain, (name, *board.platforms)))
     return next(found, None)
 
 
 def likely_board(start_frequency: float) -> str:
-    """The commonest evaluation board of a band (Hz), where nothing names one."""
+    """Return the most common evaluation board of a band (Hz), used if no board is named."""
     return "iwr1843boost" if start_frequency > 70e9 else "iwr6843isk"
 
 

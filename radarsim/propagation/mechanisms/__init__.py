@@ -1,1 +1,1 @@
-"""Ways in which an echo comes about, one per file."""
+"""Propagation mechanisms, one per file."""

@@ -1,14 +1,14 @@
-"""Curved reflectors seen over mirrors: specular ghosts of theirs, out on one way and back on another.
+"""Specular reflections of curved bodies over mirrors: ghosts with different paths out and back.
 
-Seen through the mirrors of its two ways, the radar sends from one image and receives at another. Between the two, light
-takes the shortest way over the body, by the point P whose normal halves the angle. Its strength follows from how the
-path's length grows about P (stationary phase): an endless plane there would have 1 / (r_1 + r_2) and the Hessian
-H_0 = (1 / r_1 + 1 / r_2) (1 - t t'), t the tangential part of the direction; a body of curvature C has
+Unfolded at the mirrors of its two paths, the radar transmits from one image and receives at another. Between the two,
+the wave takes the shortest path over the body, by the point P whose normal bisects the angle. Its strength follows from
+the Hessian of the path's length at P (stationary phase): an infinite plane there would have 1 / (r_1 + r_2) and the
+Hessian H_0 = (1 / r_1 + 1 / r_2) (1 - t t'), t the tangential part of the direction; a body of curvature C has
 
     1 / (r_1 + r_2) sqrt(det H_0 / det H),  H = H_0 + 2 cos(theta) C,
 
-geometric optics with its caustics (Deschamps, Proc. IEEE 60(9), 1972). A cylinder's ends cut Fresnel's integral along
-its axis, and borders that of other smooth surfaces (`patches`).
+geometric optics with its caustics (Deschamps, Proc. IEEE 60(9), 1972). A cylinder's ends truncate Fresnel's integral
+along its axis, and borders that of other smooth surfaces (`patches`).
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.propagation.apertures import STRIP_FAR, aperture, misses, passes, strip
+from radarsim.propagation.apertures import STRIP_FAR, aperture, aperture_diffraction, outside_aperture, slit_diffraction
 from radarsim.propagation.curved import grazes, growth, halving
 from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
@@ -45,7 +45,7 @@ from radarsim.propagation.reflectors import Flat, Reflectors
 from radarsim.propagation.segments import Capsule, aim, clip, empty_segments, fill, matched
 from radarsim.propagation.table import Table, filled
 
-#: Steps to the point between two images (`curved.halving`).
+#: Iterations to the point between two images (`curved.halving`).
 STEPS = 12
 
 
@@ -54,9 +54,9 @@ class CurvedGhosts(Table):
     """Echoes of curved reflectors over mirrors.
 
     Attributes:
-        points: P as seen through the mirrors of its ways out and back, m.
-        stops: place of reflection and P, out and back (P twice on a straight way), m.
-        mirrors: out and back, as indices of flat reflectors; -1: straight.
+        points: P unfolded at the mirrors of its paths out and back, m.
+        stops: point of reflection and P, out and back (P twice on a direct path), m.
+        mirrors: out and back, as indices of flat reflectors; -1: direct.
         amplitude: square root of received over transmitted power, with phase.
     """
 
@@ -67,12 +67,12 @@ class CurvedGhosts(Table):
 
     @property
     def bounces(self) -> Int[np.ndarray, "ghost"]:
-        """Mirrors on both ways, 1 or 2."""
+        """Number of mirrors on both paths, 1 or 2."""
         return (self.mirrors >= 0).sum(axis=1)
 
 
 def find(view: View) -> Paths:
-    """Ghosts above the threshold that nothing hides, weakened and delayed where they pass slabs."""
+    """Find visible ghosts above the threshold, attenuated and delayed by slabs."""
     observation, flat, reflectors = view.observation, view.flat, view.environment.reflectors
     if reflectors is None:
         return Paths.zeros(0)
@@ -84,7 +84,7 @@ def find(view: View) -> Paths:
         observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), allowed
     )  # fmt: skip
     here = observation.position[frame, None]
-    away = every.points - here  # a delay moves the point away
+    away = every.points - here  # a delay shifts the point away
     points = here + away * (1 + passed.delay.reshape(-1, 2, 1) / np.linalg.norm(away, axis=2, keepdims=True))
     mirrors = np.full((len(every), 4), -1)
     mirrors[:, [0, 2]] = every.mirrors
@@ -95,14 +95,14 @@ def find(view: View) -> Paths:
 def ghosts(
     observation: Observation, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], reflectors: Reflectors
 ) -> CurvedGhosts:
-    """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
+    """Ghosts over a mirror on one path or on both, above the threshold, before visibility tests."""
     curved = reflectors.round.columns, reflectors.smooth
     return filled(CurvedGhosts, lambda found: _find(observation, frame, flat.columns, seen, curved, found.columns))
 
 
 @njit(cache=True)
 def _find(observation, frame, flat, seen, curved, found):
-    """Returns how many there are, of which as many as fit are written."""
+    """Return the number of ghosts; as many as fit are written."""
     count, segments, mirrored_radar = 0, empty_segments(len(seen) + 1), images(observation, frame, flat, seen)
     bodies, patches = curved
     for b in range(len(bodies.radius) + len(patches.ball)):
@@ -133,13 +133,13 @@ def _find(observation, frame, flat, seen, curved, found):
 
 @njit
 def _add(observation, frame, flat, way, echo, found):
-    """Write an echo, either way round, if it is strong enough; how many that makes.
+    """Write an echo in both directions, if it is strong enough; return the number written.
 
     Args:
-        observation, frame, flat: of `_find`.
+        observation, frame, flat: see `_find`.
         way: mirrors and images of the radar out and back.
-        echo: place P, a lit point for rays to aim at, normal, amplitude from image to image, layer.
-        found: ghosts so far, and how many.
+        echo: point P, a lit point as the end of visibility rays, normal, amplitude from image to image, layer.
+        found: ghosts so far, and their number.
     """
     (one, source, two, sink), p = way, vec(observation.position[frame])
     place, lit, n, size, layer = echo
@@ -155,7 +155,7 @@ def _add(observation, frame, flat, way, echo, found):
     for m, (_, stop, direction, square) in ((one, out), (two, back)):
         size *= gain_towards(minus(stop, p), observation.rotation[frame], observation)
         if m >= 0:
-            size *= passes(stop, direction, square, aperture(flat, m))
+            size *= aperture_diffraction(stop, direction, square, aperture(flat, m))
     if abs(size) <= observation.threshold:
         return 0
     value = size * _polarisation(observation, frame, flat, way, (lit, n, layer))
@@ -167,18 +167,18 @@ def _add(observation, frame, flat, way, echo, found):
         if row < len(ghosts.amplitude):
             ghosts.amplitude[row] = value
             for end in range(2):
-                leg, m = (out, one) if end == swapped else (back, two)
+                hop, m = (out, one) if end == swapped else (back, two)
                 ghosts.mirrors[row, end] = m
                 write(_seen(flat, m, place), ghosts.points[row, end])
-                write(leg[1] if m >= 0 else clear, ghosts.stops[row, end, 0])
+                write(hop[1] if m >= 0 else clear, ghosts.stops[row, end, 0])
                 write(clear, ghosts.stops[row, end, 1])
     return ways
 
 
 @njit
 def _strength(observation, flat, bodies, b, way):
-    """The specular point of a body between two images of the radar, a lit point near it for rays to aim at, the normal
-    there, and the amplitude that an isotropic antenna gets from one image to the other."""
+    """Specular point of a body between two images of the radar, a lit point near it as the end of visibility rays, the
+    normal there, and the amplitude from one image to the other for an isotropic antenna."""
     radius, half, axis, none = bodies.radius[b], bodies.half[b], vec(bodies.axis[b]), (0.0, 0.0, 0.0)
     (first, one, second, two), center = way, vec(bodies.center[b])
     n, a, c = halving((center, axis, radius), one, two, STEPS)
@@ -199,12 +199,12 @@ def _strength(observation, flat, bodies, b, way):
     low, high = _above(flat, second, two, line, axis, _above(flat, first, one, line, axis, (-half, half)))
     if low >= high or z <= low - STRIP_FAR * zone or z >= high + STRIP_FAR * zone:
         return none, none, none, 0j
-    return place, along(line, aim(z, low, high), axis), n, size * strip((low - z) / zone, (high - z) / zone)
+    return place, along(line, aim(z, low, high), axis), n, size * slit_diffraction((low - z) / zone, (high - z) / zone)
 
 
 @njit
 def _above(flat, m, image, line, axis, span):
-    """What of a span along a line lies before a mirror, on the side from which the radar of that image sees it."""
+    """Part of a span along a line in front of a mirror, on the side from which the radar of that image sees it."""
     if m < 0:
         return span
     c, n = vec(flat.center[m]), vec(flat.normal[m])
@@ -214,14 +214,14 @@ def _above(flat, m, image, line, axis, span):
 
 @njit
 def _seen(flat, m, place):
-    """Where a place is seen over a mirror, or straight."""
+    """Image of a place in a mirror, or the place itself."""
     return place if m < 0 else mirrored(place, vec(flat.center[m]), vec(flat.normal[m]))
 
 
 @njit
 def _stop(observation, flat, m, source, place):
-    """Whether light gets to a place over a mirror or straight, over which point it leaves the radar, the direction from
-    there on, and the square of the Fresnel unit there, m^2."""
+    """Whether a place is reached over a mirror or directly, the first point of the path after the radar, the direction
+    from there on, and the square of the Fresnel unit there, m^2."""
     if m < 0:
         return True, place, (0.0, 0.0, 0.0), 0.0
     window = aperture(flat, m)
@@ -231,14 +231,14 @@ def _stop(observation, flat, m, source, place):
     share, way = h / (h - level), minus(place, source)
     stop, square = along(source, share, way), 0.5 * observation.wavelength * length(way) * share * (1 - share)
     way = unit(way)
-    return not misses(stop, way, square, window), stop, way, square
+    return not outside_aperture(stop, way, square, window), stop, way, square
 
 
 @njit
 def _polarisation(observation, frame, flat, way, surface):
-    """Product of the reflection coefficients, an upright field sent and taken.
+    """Product of the reflection coefficients for vertical polarisation at transmitter and receiver.
 
-    Directions are those from the images: where the body stands on the mirror, both reflections are at one place.
+    Directions are those from the images: where the body touches the mirror, both reflections are at one place.
 
     Args:
         observation, frame: of the radar.

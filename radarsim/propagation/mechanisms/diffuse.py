@@ -1,10 +1,10 @@
-"""Echoes of scatterers: straight, through slabs and over mirrors, out on one way and back on another.
+"""Echoes of scatterers: direct, through slabs and over mirrors, with any combination of paths out and back.
 
 Two one-way paths to the same scatterer (`one_way`) make an echo of amplitude
 
     a = lambda sqrt(sigma) / (4 pi)^(3/2) sqrt(cos_1 cos_2) path_1 path_2,
 
-the radar equation |a|^2 = G^2 lambda^2 sigma / ((4 pi)^3 R^4) for a straight pair, with Lambert's cosine either way.
+the radar equation |a|^2 = G^2 lambda^2 sigma / ((4 pi)^3 R^4) for a direct pair, with Lambert's cosine for each path.
 """
 
 from dataclasses import replace
@@ -23,22 +23,22 @@ from radarsim.propagation.mirror_reach import Trials
 from radarsim.propagation.one_way import OneWay, over_mirrors
 from radarsim.propagation.paths import Kind, Paths
 
-#: Mirrors over which an echo goes out and back, together.
+#: Largest number of mirrors on the paths out and back together.
 MOST_BOUNCES = 2
-#: Paths to scatterers over two mirrors are looked for over those of this area and more, m^2: at 2 m a Fresnel zone
-#: takes 0.02. There are many more pairs with smaller ones, which show little of the world.
+#: Smallest area of mirrors, m^2, for paths over two of them: at 2 m a Fresnel zone takes 0.02. Pairs of smaller ones
+#: are much more numerous and contribute little.
 LEAST_TWICE = 0.05
 
 
 def find(view: View) -> Paths:
-    """Echoes of all scatterers above the threshold."""
+    """Find the echoes of all scatterers above the threshold."""
     straight = _straight(view)
     one_way = OneWay.joined([straight, _over_mirrors(view, straight)])
     return _two_way(view, one_way)
 
 
 def _straight(view: View) -> OneWay:
-    """Straight paths worth an echo, through slabs last."""
+    """Significant direct paths, those through slabs last."""
     candidates, targets, threshold = view.candidates, view.targets, view.observation.threshold
     rows = np.flatnonzero(candidates.echo > threshold)
     paths = OneWay.straight(view.observation, targets, candidates, rows)
@@ -54,15 +54,15 @@ def _over_mirrors(view: View, straight: OneWay) -> OneWay:
     trials, free = [], np.zeros(len(candidates), bool)
     free[straight.candidate[~straight.through]] = True
     once, twice = targets.weights[candidates.scatterer, 1:].T > 0
-    # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
+    # Hidden scatterers are visible only over mirrors out and back, a second-order echo: fewer of them suffice.
     rows = np.flatnonzero(np.where(free, once, twice))
     distance = candidates.distance[rows]
-    # No longer than leaves room for the way back, nor so weak that the way back cannot make up for it.
+    # Upper bounds on length and attenuation, from the shortest and strongest path back.
     reached = np.zeros(len(candidates), bool)
     reached[straight.candidate] = True
     longest = np.where(reached[rows], 2 * observation.range - distance, observation.range)
     weakest = observation.threshold * distance / (observation.peak_gain * candidates.most[rows])
-    # Tracks of virtual points are those of one mirror either way: moving targets have no paths over two.
+    # Tracks of virtual points exist for one mirror per path: moving targets have no paths over two.
     double = (reached & twice & (candidates.scatterer < targets.still))[rows]
     edges = np.searchsorted(candidates.frame[rows], np.arange(observation.frames + 1))
     for frame, (seen, pairs) in enumerate(view.mirrors):
@@ -82,20 +82,20 @@ def _over_mirrors(view: View, straight: OneWay) -> OneWay:
 def _unhindered(
     view: View, paths: OneWay, stops: Float[np.ndarray, "path stop 3"], allowed: Bool[np.ndarray, "path"]
 ) -> OneWay:
-    """Those paths that get through from stop to stop, weakened and delayed where they pass slabs."""
+    """Paths that are clear from stop to stop, attenuated and delayed by slabs."""
     observation, frame = view.observation, view.candidates.frame[paths.candidate]
     passed = view.obstacles.way(observation, frame, stops, 1 + paths.bounces, allowed)
     clear = np.flatnonzero(passed.factor)
     paths, passed = paths[clear], passed[clear]
     paths = replace(paths, amplitude=paths.amplitude * passed.factor, through=passed.through)
-    late = np.flatnonzero(paths.through)  # a delay moves the virtual point away
+    late = np.flatnonzero(paths.through)  # a delay shifts the virtual point away
     offset = paths.virtual[late] - observation.position[frame[clear[late]]]
     paths.virtual[late] += offset * (passed.delay[late] / np.linalg.norm(offset, axis=1))[:, None]
     return paths
 
 
 def _strongest_echoes(candidates: Candidates, straight: OneWay, paths: OneWay) -> Float[np.ndarray, "path"]:
-    """Amplitude that no echo which each path over mirrors can be part of exceeds."""
+    """Upper bound of the amplitude of any echo that contains each path over mirrors."""
     size, best = np.abs(paths.amplitude), np.zeros(len(candidates))
     best[straight.candidate] = np.abs(straight.amplitude)
     np.maximum.at(best, paths.candidate, size)
@@ -103,7 +103,7 @@ def _strongest_echoes(candidates: Candidates, straight: OneWay, paths: OneWay) -
 
 
 def _two_way(view: View, one_way: OneWay) -> Paths:
-    """All pairs of paths to the same scatterer that make an echo within range and above the threshold."""
+    """All pairs of paths to the same scatterer whose echo is within range and above the threshold."""
     targets, candidates = view.targets, view.candidates
     first, order = _grouped(one_way.candidate, len(candidates))
     most = int(np.sum(np.diff(first) ** 2))
@@ -150,7 +150,7 @@ def _grouped(group, groups):
 
 @njit(cache=True)
 def _join(observation, grouped, scatterers, path, found):
-    """Fills pairs of paths and amplitudes of their echoes; returns how many there are."""
+    """Write pairs of paths and amplitudes of their echoes; return their number."""
     pairs, amplitude = found
     n = 0
     for c in range(len(grouped.first) - 1):
@@ -180,7 +180,7 @@ def _join(observation, grouped, scatterers, path, found):
                     continue
                 strength = grouped.size[c] * np.sqrt(scattering(there, back, dot(to_i, to_j), scatterers.lobe[s]))
                 value = strength * (path.amplitude[i] * path.amplitude[j])
-                # what the weight adds stands for scatterers left out: it makes no echo worth keeping
+                # tested without the weight, which represents omitted scatterers
                 if abs(value) <= observation.threshold:
                     continue
                 pairs[n, 0], pairs[n, 1] = i, j

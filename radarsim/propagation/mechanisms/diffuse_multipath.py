@@ -1,4 +1,4 @@
-"""Echoes that are scattered twice and more on their way, from surface to surface (`reverberation`)."""
+"""Diffuse multipath: echoes that are scattered at two or more surfaces (`reverberation`)."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from radarsim.propagation.reverberation import echoes
 
 
 def find(view: View) -> Paths:
-    """Those above the threshold whose ends the radar sees, either way round."""
+    """Find visible echoes above the threshold, in both directions."""
     observation, detours = view.observation, view.environment.detours
     frame, which, amplitude = echoes(observation, detours)
     for ends in (detours.begin, detours.end):
@@ -16,7 +16,7 @@ def find(view: View) -> Paths:
         frame, which, amplitude = frame[seen], which[seen], amplitude[seen]
     here = observation.position[frame, None]
     away = np.stack([detours.begin[which], detours.end[which]], axis=1) - here
-    # the walk between both ends moves each away by half of it
+    # the walk between both ends shifts each away by half of it
     farther = 1 + detours.between[which, None, None] / 2 / np.linalg.norm(away, axis=2, keepdims=True)
     points, value = here + away * farther, amplitude * np.exp(1j * detours.phase[which])
     return Paths.of(

@@ -1,14 +1,14 @@
-"""Echoes by mirrors alone, two or three in a chain: images of the radar itself, corners included.
+"""Echoes over two or three mirrors without a scatterer: images of the radar itself, including corner reflectors.
 
-A chain m_1 ... m_k takes the receiver to M rx, M = R_1 ... R_k the product of the reflections, and the echo's path is
-|tx - M rx|, straight through the mirrors unfolded along it. Two mirrors at right angles make M a half turn about their
-edge and three an inversion in their corner, whose path passes the edge or corner itself for every place of the radar;
-each order of the mirrors then holds its own share of the light.
+A chain m_1 ... m_k maps the receiver to M rx, M = R_1 ... R_k the product of the reflections, and the echo's path
+length is |tx - M rx|, straight through the mirrors unfolded along it. Two mirrors at right angles make M a half turn
+about their edge, and three an inversion in their corner; the path passes the edge or corner itself for every position
+of the radar, and each order of the mirrors has its own part of the wave.
 
-The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts as its
-offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all apertures of a chain overlap to one
-polygon W (a mirror that runs on behind the next one ends where their planes meet: no ray gets there), and the amplitude
-lambda / (4 pi L) of an endless mirror is taken F times,
+The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts according
+to its offset x over sqrt(lambda d (L - d) / (2 L)) (Fresnel), so in these units the apertures of a chain overlap to one
+polygon W (a mirror that extends behind the next one ends where their planes meet: no ray gets there), and the amplitude
+lambda / (4 pi L) of an infinite mirror is multiplied by F,
 
     F = (1 / 2j) int_W exp(j pi r^2 / 2) dA = (1 / 2 pi) closed int (1 - exp(j pi r^2 / 2)) dphi,
 
@@ -42,29 +42,29 @@ from radarsim.propagation.fields import (
     vec,
     write,
 )  # fmt: skip
-from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.fresnelzone import AT_RADAR, PathSegments
 from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table, filled
 
-#: No aperture passes more than this of an amplitude: two slits of Cornu's 1.17.
+#: Largest amplitude factor of an aperture: two slits of 1.17 (Cornu's spiral).
 _MOST = 1.4
 
 
 @dataclass(frozen=True)
 class Chains(Table):
-    """Ways over mirrors that lead from the sensor back to it, each in one of its two directions.
+    """Chains of mirrors that lead from the sensor back to it, each in one of its two directions.
 
     The other direction has the same amplitude and the inverse isometry (`isometry.inverse`); a chain with the same
-    mirror at either end is its own reverse.
+    mirror at both ends is its own reverse.
 
     Attributes:
-        mirrors: of two, the second one twice.
+        mirrors: indices; for two mirrors, the second one twice.
         isometry: of the receiver.
         amplitude: square root of received over transmitted power, with phase.
-        stops: places of reflection of a ray that takes this way (the last one repeated up to three), m.
+        stops: points of reflection of a ray along the chain (the last one repeated up to three), m.
     """
 
     mirrors: Int[np.ndarray, "chain 3"]
@@ -74,13 +74,13 @@ class Chains(Table):
 
 
 def find(view: View) -> Paths:
-    """Chains of two and three mirrors above the threshold, either way round."""
+    """Find chains of two and three mirrors above the threshold, in both directions."""
     observation, flat = view.observation, view.flat
     found = [chains(flat, some.pairs, observation, k) for k, some in enumerate(view.mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), Chains.joined(found)
     two = every.mirrors[:, 1] == every.mirrors[:, 2]
-    stretches = _stretches(observation, flat, frame, every)
-    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(every.amplitude))
+    segments = _segments(observation, flat, frame, every)
+    passed = fresnelzone.passage(observation, flat, view.obstacles, segments, np.abs(every.amplitude))
     directions = []
     for reverse, rows in (
         (False, np.arange(len(every))),
@@ -98,8 +98,8 @@ def find(view: View) -> Paths:
     return Paths.joined(directions)
 
 
-def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "chain"], chains: Chains) -> Stretches:
-    """The four stretches of each chain, of two mirrors one of no length."""
+def _segments(observation: Observation, flat: Flat, frame: Int[np.ndarray, "chain"], chains: Chains) -> PathSegments:
+    """The four path segments of each chain; for two mirrors, one has zero length."""
     here = observation.position[frame, None]
     stops = np.concatenate([here, chains.stops, here], axis=1)
     way = np.diff(stops, axis=1)
@@ -110,14 +110,14 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
     aside = np.cross(now, observation.rotation[frame, :, 2])
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     axes = np.stack([aside, np.cross(now, aside)], axis=1)
-    apart = np.empty((len(frame), 5, 2, 3))  # of a unit aside, by stop
+    apart = np.empty((len(frame), 5, 2, 3))  # shift per unit, by stop
     apart[:, 0] = AT_RADAR * unit[:, 0, None, None] * axes
     for k in range(3):
         normal = flat.normal[chains.mirrors[:, k]]
         lift = np.einsum("cad,cd->ca", axes, normal)[..., None]
         slope = np.einsum("cd,cd->c", now, normal)[:, None]
         apart[:, k + 1] = unit[:, k, None, None] * (axes - lift * (now / slope)[:, None])  # in the mirror's plane
-        last = (chains.mirrors[:, k] == chains.mirrors[:, min(k + 1, 2)]) & (k < 2)  # twice: it reflects once
+        last = (chains.mirrors[:, k] == chains.mirrors[:, min(k + 1, 2)]) & (k < 2)  # repeated: it reflects once
         axes = np.where(last[:, None, None], axes, axes - 2 * lift * normal[:, None])
         now = np.where(last[:, None], now, now - 2 * slope * normal)
     apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
@@ -125,7 +125,7 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
     mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
     along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
     mirrors, reflections, aside = (np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4]))
-    return Stretches(
+    return PathSegments(
         path=np.repeat(np.arange(len(frame)), 4), frame=np.repeat(frame, 4),
         begin=stops[:, :-1].reshape(-1, 3), end=stops[:, 1:].reshape(-1, 3),
         before=apart[:, :-1].reshape(-1, 2, 3), after=apart[:, 1:].reshape(-1, 2, 3),
@@ -135,19 +135,19 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
 
 
 class _Orders(NamedTuple):
-    """What can follow what: firsts[start[b] : start[b + 1]] are the mirrors that can be before b, and after it."""
+    """Successors of mirrors: firsts[start[b] : start[b + 1]] are the mirrors that can be before b, and after it."""
 
     start: Int[np.ndarray, "mirror+1"]
     firsts: Int[np.ndarray, "pair"]
 
 
 def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observation, frame: int) -> Chains:
-    """Chains of two and three mirrors above the threshold.
+    """Find chains of two and three mirrors above the threshold.
 
     Args:
         flat: mirrors.
-        pairs: which can be first, and which second after it (see `visible_mirrors.Mirrors`).
-        observation, frame: from where.
+        pairs: possible first and second mirrors (see `visible_mirrors.Mirrors`).
+        observation, frame: sensor poses, and index of the frame.
     """
     pairs = pairs[np.lexsort(pairs.T)]
     orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
@@ -156,7 +156,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
 
 @njit(cache=True)
 def _search(observation, frame, flat, orders, found):
-    """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
+    """Try all possible chains; return the number that lead back, of which as many as fit are written."""
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
     up, wavelength, threshold = upwards(rotation), observation.wavelength, observation.threshold
     room, edges = scratch(), outlines(flat)
@@ -173,7 +173,7 @@ def _search(observation, frame, flat, orders, found):
             for j in range(i - 1, len(firsts)):
                 order = 2 if j < i else 3
                 c = b if order == 2 else firsts[j]
-                if order == 2 and (b < a or not _after(orders, b, a)):  # the way back is not searched for
+                if order == 2 and (b < a or not _after(orders, b, a)):  # the reverse direction is not searched
                     continue
                 # From the sensor's image in the first two mirrors straight to that in the last one, or to itself.
                 middle = minus(p if order == 2 else vec(images[c]), image_b)
@@ -182,7 +182,7 @@ def _search(observation, frame, flat, orders, found):
                     continue
                 path = np.sqrt(path)
                 middle = (middle[0] / path, middle[1] / path, middle[2] / path)
-                # The last mirror is met by that ray, the others by what it was before them.
+                # The last mirror is met by that ray, the others by its reflections before them.
                 if order == 3 and not _meets(image_b, middle, -1.0, path, wavelength, flat, edges, c):
                     continue
                 if not _meets(image_b, middle, 1.0, path, wavelength, flat, edges, b):
@@ -202,7 +202,7 @@ def _search(observation, frame, flat, orders, found):
                 if corners < 3:
                     continue
                 share = left * kirchhoff(room.polygon, corners)
-                if 1.001 * abs(share) * strength <= threshold:  # what mirrors reflect comes last: it costs the most
+                if 1.001 * abs(share) * strength <= threshold:  # reflection coefficients last: they cost the most
                     continue
                 value = _reflected(way[:order], up, ray, flat) * share * strength
                 if abs(value) <= threshold:
@@ -212,7 +212,7 @@ def _search(observation, frame, flat, orders, found):
                         found.mirrors[count, k] = way[min(k, order - 1)]
                     _isometry(way[:order], flat, found.isometry[count])
                     found.amplitude[count] = value
-                    # A ray through the polygon, which misses the very edge of corners.
+                    # A ray through the polygon, which avoids the exact edge of corners.
                     zone, (x, y) = np.sqrt(wavelength * path / 8), inside(room, bounds, corners)
                     aim = along(along(along(p, path / 2, ray), zone * x, e1), zone * y, e2)
                     _course(way[:order], p, aim, flat, found.stops[count])
@@ -222,7 +222,7 @@ def _search(observation, frame, flat, orders, found):
 
 @njit
 def _after(orders, a, b):
-    """Whether b can be the mirror after a."""
+    """Whether b can follow mirror a."""
     some = orders.firsts[orders.start[b] : orders.start[b + 1]]
     at = np.searchsorted(some, a)
     return at < len(some) and some[at] == a
@@ -230,21 +230,21 @@ def _after(orders, a, b):
 
 @njit
 def _turned(ray, flat, m):
-    """A direction of travel, before a mirror or after it."""
+    """Direction of propagation after reflection in a mirror, or before it."""
     n = vec(flat.normal[m])
     return along(ray, -2 * dot(ray, n), n)
 
 
 @njit
 def _meets(image, ray, side, path, wavelength, flat, edges, m):
-    """Whether a straight path from an image of the radar passes near a mirror: a quick test before `window`.
+    """Whether a straight path from an image of the radar passes near a mirror: a fast test before `window`.
 
     Args:
         image: m.
         ray, side: direction after the mirror, and 1, or before it, and -1.
-        path: the whole way, m.
+        path: length of the whole path, m.
         edges: of all mirrors (`apertures.outlines`).
-        m: the mirror.
+        m: index of the mirror.
     """
     n = vec(flat.normal[m])
     slope = dot(ray, n)
@@ -257,7 +257,7 @@ def _meets(image, ray, side, path, wavelength, flat, edges, m):
     low_u, high_u, low_v, high_v = edges[m]
     offset = minus(along(image, t, ray), center)
     x, y = dot(offset, vec(flat.u[m])), dot(offset, vec(flat.v[m]))
-    # The zone is widest half way: where an edge is nearer to that than the path is in the mirror's plane, it counts.
+    # The zone is widest half way: an edge that is nearer to that than to the path in the mirror's plane counts.
     size = high_u - low_u + high_v - low_v
     widest = min(max(path / 2, t - size), t + size)
     margin = FAR * np.sqrt(wavelength * widest * (path - widest) / (2 * path)) / abs(slope)
@@ -266,7 +266,7 @@ def _meets(image, ray, side, path, wavelength, flat, edges, m):
 
 @njit(cache=True)
 def _reflected(way, up, ray, flat):
-    """Product of the reflection coefficients of a chain that sets out along a ray, from an upright field to one."""
+    """Product of the reflection coefficients of a chain along a ray, for vertical polarisation at both ends."""
     field, now = sent(up, ray), ray
     for m in way:
         after = _turned(now, flat, m)
@@ -289,7 +289,7 @@ def _isometry(way, flat, out):
 
 @njit(cache=True)
 def _course(way, p, aim, flat, stops):
-    """Where a ray from p through a point meets the mirrors of a chain."""
+    """Points where a ray from p through a point meets the mirrors of a chain."""
     start, now = p, unit(minus(aim, p))
     for k in range(3):
         if k < len(way):

@@ -1,4 +1,4 @@
-"""Specular reflections of plates and curved bodies that face the radar, with the echoes of their edges and corners."""
+"""Specular reflections of plates and curved bodies, with the diffraction of their edges and corners."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from jaxtyping import Complex, Float, Int
 from radarsim.propagation import fresnelzone, patches, plates
 from radarsim.propagation.curved import LINE, SpecularPoints
 from radarsim.propagation.environment import View
-from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.fresnelzone import AT_RADAR, PathSegments
 from radarsim.propagation.isometry import image
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Kind, Paths
@@ -20,7 +20,7 @@ _APART = 0.6
 
 
 def find(view: View) -> Paths:
-    """Those of all frames above the threshold."""
+    """Find the specular reflections of all frames above the threshold."""
     observation, flat, reflectors = view.observation, view.facing, view.environment.reflectors
     if reflectors is None:
         return Paths.zeros(0)
@@ -48,9 +48,9 @@ def find(view: View) -> Paths:
         Paths.of(Kind.CURVED, curved.geometry, curved.amplitude, frame=of_curved),
     ])  # fmt: skip
     ways = [_to_parts(observation, of_part, flat, parts), _to_bodies(observation, of_curved, curved)]
-    stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
-    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(paths.amplitude))
-    lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
+    segments = replace(PathSegments.joined(ways), path=np.arange(len(paths)))
+    passed = fresnelzone.passage(observation, flat, view.obstacles, segments, np.abs(paths.amplitude))
+    lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # amplitudes include it at the centre of the sweep
     paths = replace(paths, amplitude=paths.amplitude * np.exp(-2j * np.pi * lag / observation.wavelength))
     return paths.behind(observation, replace(passed, delay=passed.delay + lag))
 
@@ -58,10 +58,10 @@ def find(view: View) -> Paths:
 def _merged(
     observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints
 ) -> tuple[Int[np.ndarray, "merged"], SpecularPoints]:
-    """Parts with those across a strip that is narrower than a zone in one, from its middle line.
+    """Merge the parts across a strip that is narrower than a zone into one, at its middle line.
 
     Edges on both sides of a strip nearly cancel: their amplitudes go as 1 / s, s from the specular point, which changes
-    as the radar moves on by a share of s. That of the whole strip changes less while s times its width is below about
+    as the radar moves by a fraction of s. That of the whole strip changes less while s times its width is below about
     `_APART` squared Fresnel units.
     """
     some = flat[parts.facet]
@@ -76,7 +76,7 @@ def _merged(
     if not len(rows):
         return frame, parts
     narrow, axes, center, place = narrow[rows], axes[rows], some.center[rows], observation.position[frame[rows]]
-    # along u and v a part mirrors nothing, or about a line so far from the middle
+    # along u and v a part does not mirror, or only about a line so far from the middle
     turned = np.einsum("pad,pde,pae->pa", axes, parts.isometry[rows, :, :3], axes)[:, :2] < 0
     line = np.einsum("pad,pd->pa", axes[:, :2], image(parts.isometry[rows], center) - center) / 2
     side = np.where(narrow, 2, np.where(turned, np.sign(line), 0)).astype(int)
@@ -101,11 +101,12 @@ def _merged(
     return np.append(frame[rest], frame[one]), SpecularPoints.joined([parts[rest], strips])
 
 
-def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints) -> Stretches:
-    """Path segments to parts of plates: a face mirrors, an edge mirrors along its line, a corner echoes like a point.
+def _to_parts(
+    observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints
+) -> PathSegments:
+    """Path segments to parts of plates: a face mirrors, an edge mirrors along its line, a corner scatters like a point.
 
-    Across an edge that is near the specular point, in Fresnel units, it is a part of the same zone and goes over into
-    it.
+    An edge that is near the specular point, in Fresnel units, is part of the same zone; the transition is smooth.
     """
     here, n = observation.position[frame], len(parts)
     way = parts.aim - here
@@ -113,7 +114,7 @@ def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Fl
     kind = np.trace(turn, axis1=1, axis2=2).round().astype(int)  # 1: reflection, -1: half turn, -3: inversion
     unit = np.sqrt(observation.wavelength * np.linalg.norm(way, axis=1) / 4)
     u, normal = flat.u[parts.facet], flat.normal[parts.facet]
-    # (M + 1) / 2 of a half turn projects on its axis
+    # (M + 1) / 2 of a half turn projects onto its axis
     line = np.einsum("pii->pi", turn).argmax(axis=1)
     u = np.where((kind == -1)[:, None], (turn + np.eye(3))[np.arange(n), line], u)
     u = u / np.linalg.norm(u, axis=1, keepdims=True)
@@ -127,19 +128,19 @@ def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Fl
     mirrors = np.where(np.arange(3) == 0, np.where(kind == -3, -1, parts.facet)[:, None], -1)
     stops = np.repeat(parts.aim[:, None], 3, axis=1), np.repeat(after[:, None], 3, axis=1)
     span = np.tile([0.0, 0.5], (n, 1))
-    return Stretches(
+    return PathSegments(
         np.zeros(n, int), frame, here, parts.aim, before, after, mirrors, *stops, span, mirroring
     )  # fmt: skip
 
 
 def _spread(mirroring, axes):
-    """How far a Fresnel unit moves both ends of ways: to a mirror, and to a point, which is the tip of a cone."""
+    """Shift of both ends of a segment per Fresnel unit: to a mirror, and to a point, which is the tip of a cone."""
     mirroring = mirroring[..., None]
     return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
 
 
-def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved: SpecularPoints) -> Stretches:
-    """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
+def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved: SpecularPoints) -> PathSegments:
+    """Path segments to round bodies, which scatter like points, and to cylinders, which mirror along their axis."""
     begin, n = observation.position[frame], len(curved)
     way = curved.aim - begin
     size = np.linalg.norm(way, axis=1, keepdims=True)
@@ -152,7 +153,7 @@ def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved
     mirroring = np.column_stack([line, np.zeros(n)]).astype(float)
     before, after = _spread(mirroring, axes)
     none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
-    return Stretches(
+    return PathSegments(
         np.zeros(n, int), frame, begin, curved.aim, before, after, *none, span, mirroring
     )  # fmt: skip
 
@@ -160,14 +161,15 @@ def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved
 def _uneven(
     observation: Observation, frame: int, flat: Flat, aim: Float[np.ndarray, "part 3"], heights: Heights
 ) -> Complex[np.ndarray, "part"]:
-    """What unevenness makes of parts of plates: the factor at the foot, less and less of it away from there."""
+    """Factor of unevenness on parts of plates: that of the foot of the perpendicular, fading with the distance from
+    it."""
     begin = observation.position[frame]
     height = np.einsum("pd,pd->p", begin - flat.center, flat.normal)
     foot, away = begin - height[:, None] * flat.normal, np.abs(height)
     reach = heights.reach(away, flat.finish, observation.wavelength)
     share = np.clip(2 * (1 - np.linalg.norm(aim - foot, axis=1) / np.maximum(reach, 1e-9)), 0, 1)
     factor, near = np.ones(len(aim), complex), np.flatnonzero((share > 0) & (flat.finish > 0))
-    # Parts of one plate, and plates of one wall, share a foot.
+    # Parts of one plate, and plates of one wall, share a foot point.
     _, one, which = np.unique(foot[near].round(6), axis=0, return_index=True, return_inverse=True)
     some = near[one]
     found = heights.factors(

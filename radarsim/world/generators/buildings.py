@@ -1,10 +1,10 @@
-"""Procedural buildings: any floor from a style, a seed and a floor's number, or an office of a given size.
+"""Procedural buildings: floors of a given style, seed and floor number, or an office of a given size.
 
     building: {kind: A, seed: 3, floor: 2}
     building: {kind: office, seed: 7, length: 18}
 
-The seed gives what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor's number varies
-rooms, doors (`layout`) and furniture (`furnishing`). World origin at the south-west corner, floor at z = 0.
+The seed determines what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor number
+varies rooms, doors (`layout`) and furniture (`furnishing`). World origin at the south-west corner, floor at z = 0.
 """
 
 from abc import ABC, abstractmethod
@@ -50,17 +50,17 @@ class Floor(Strict, ABC):
 
     @abstractmethod
     def skeleton(self) -> Skeleton:
-        """What all floors share."""
+        """Outline, corridors and stairs shared by all floors."""
 
     def plan(self) -> FloorPlan:
         """The floor's rooms and openings."""
         return FloorPlan(self.skeleton(), self.style, self._rng(self.floor, 1))
 
     def build(self, furniture: float = 1.0) -> list[SceneObject]:
-        """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture.
+        """Build all objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture.
 
         Args:
-            furniture: number of pieces of furniture, as a share of the usual.
+            furniture: number of pieces of furniture, relative to the usual.
         """
         plan, site = self.plan(), Site(self._rng(self.floor, 2), self.style.height, furniture)
         surfaces(site, plan)
@@ -113,7 +113,7 @@ class Office(Floor):
         return replace(STYLES["office"], height=self.height)
 
     def skeleton(self) -> Skeleton:
-        """The southern row first."""
+        """The two rows of rooms, the southern one first."""
         thick, wall = self.style.outer, self.style.inner
         low, high, far = (self.depth - self.corridor) / 2, (self.depth + self.corridor) / 2, self.length - thick
         sides = (thick, low - wall), (high + wall, self.depth - thick)
@@ -123,7 +123,8 @@ class Office(Floor):
 
 
 def surfaces(site: Site, plan: FloorPlan) -> None:
-    """Walls: the ground less the rooms and openings, their faces by label. Floors and ceilings by room."""
+    """Add walls, which are the ground without rooms and openings, with faces by label, and floors and ceilings by
+    room."""
     style, height = plan.style, plan.style.height
     boxes = plan.skeleton.ground(style.outer), [room.floor.bounds for room in plan.rooms], plan.columns
     solids, rooms, pillars = ([(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in part] for part in boxes)

@@ -1,4 +1,4 @@
-"""What stands in a room, by its kind: pieces in rows along the walls, tables in the middle, as people arrange them."""
+"""Furnishing of rooms by kind: rows of pieces along the walls and tables in the middle."""
 
 import numpy as np
 from shapely.geometry import box as area
@@ -11,12 +11,12 @@ from radarsim.world.generators.openings import OPPOSITE
 from radarsim.world.generators.rooms import Room, Site, footprint
 
 _ROOMS = read_beside(__file__)
-#: Clear width left beside things in a corridor, m.
+#: Clear width left beside furniture in a corridor, m.
 CLEAR = 1.25
 
 
 def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
-    """Put furniture and fittings into a room; ways and doors stay free."""
+    """Put furniture and fittings into a room; paths between doors stay free."""
     if room.kind == "corridor":
         _corridor(site, room, plan)
         return
@@ -32,7 +32,7 @@ def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
 
 
 class _Layout:
-    """A room with its sides named as one sees them from the door: front (behind one), back, left, right."""
+    """Room with its sides named as seen from the door: front (the door's wall), back, left, right."""
 
     def __init__(self, site: Site, room: Room, plan: FloorPlan):
         self.site, self.room, self.plan, self.style = site, room, plan, plan.style
@@ -62,7 +62,7 @@ class _Layout:
             self.site.put_if_free(self.room, piece, x, y, 0.0)
 
     def made(self, kind: str, material: str = "", **given: float) -> Piece:
-        """A piece of a material, by default the style's."""
+        """Make a piece of a material, by default the style's."""
         return make(kind, self.rng, material or self._materials.get(kind, ""), **given)
 
     def line(
@@ -75,7 +75,7 @@ class _Layout:
         off: float = 0.03,
         material: str = "",
     ) -> list[tuple[float, float, float]]:
-        """A row of pieces along a wall, from the window's end (or the low end), and the places they got."""
+        """Put a row of pieces along a wall, from the window's end (or the low end); return their places."""
         room = self.room
         low, high = room.wall(side)
         downward = self.back in "ne" and side in (self.left, self.right)
@@ -95,7 +95,7 @@ class _Layout:
         return places
 
     def arrange(self, steps: list[dict]) -> None:
-        """Put furniture as `furnishing.yaml` says."""
+        """Put furniture according to `furnishing.yaml`."""
         short, long = sorted(self.room.size)
         for step in steps:
             about = dict(step)
@@ -103,7 +103,7 @@ class _Layout:
             kind = kind if isinstance(kind, str) else kind[int(self.rng.random() >= 0.5)]
             usual = evaluate(about.pop("count", 1), {"area": short * long, "short": short, "long": long})
             count = self.site.number(usual)
-            if side == "middle":  # which the usual number fills
+            if side == "middle":  # filled by the usual number
                 self.tables(min(count, int(usual)), kind, **about)
                 continue
             for x, y, yaw in self.line(getattr(self, side), kind, count, **about):
@@ -115,7 +115,8 @@ class _Layout:
                     self.site.put_if_free(self.room, piece, x, y, yaw)
 
     def tables(self, rows: int, kind: str, seats: tuple[int, ...] = (), gap: float = 0.01, **given: float) -> None:
-        """Tables in the middle, end to end along the room's longer side, with chairs along `seats` (their sides)."""
+        """Put tables in the middle, end to end along the longer side, with chairs along `seats` (sides of the
+        tables)."""
         room = self.room
         if not rows:
             return
@@ -145,7 +146,7 @@ class _Layout:
             at += piece.width + gap
 
     def stairs(self) -> None:
-        """Flights along the wall opposite to the door, their foot at the door's end."""
+        """Put stairs along the wall opposite to the door, starting at the door's end."""
         room = self.room
         door = next(o for o in self.openings if o.kind == "door")
         at_low = (door.low + door.high) / 2 < (room.x0 + room.x1) / 2
@@ -177,7 +178,7 @@ def _lecture(x: _Layout) -> None:
                 for side in (-0.4, 0.4):
                     sx, sy = px - side * np.sin(yaw), py + side * np.cos(yaw)
                     site.seat(room, float(sx), float(sy), yaw, away=0.62)
-    if not rows:  # the ways between its doors leave no room for rows
+    if not rows:  # the paths between its doors leave no room for rows
         x.arrange(_ROOMS["lecture"])
     x.line(x.front, "bin", site.number(1))
 
@@ -203,14 +204,14 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
                 side = str(rng.choice(["s", "n"] if along_x else ["w", "e"]))
                 low, high = room.wall(side)
                 along = rng.uniform(low + piece.width / 2, high - piece.width / 2)
-                # A lift's doors lie in the wall; all else stands before it.
+                # A lift's doors lie in the wall; all other pieces stand in front of it.
                 off = 0.022 if what == "lift" else 0.02 + piece.depth / 2
                 place = room.wall_place(side, along, off)
                 spot = footprint(piece, *place)
                 if any(spot.buffer(0.02).intersects(a) for a in avoid) or not room.floor.buffer(0.05).contains(spot):
                     continue
                 site.put(room, piece, *place)
-                # Nothing else stands opposite.
+                # Only one side of a corridor is used.
                 a, b = along - piece.width / 2 - 0.3, along + piece.width / 2 + 0.3
                 avoid.append(area(a, room.y0, b, room.y1) if along_x else area(room.x0, a, room.x1, b))
                 break

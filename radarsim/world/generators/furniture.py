@@ -13,7 +13,7 @@ import trimesh
 from radarize.io.yamlfile import read_beside
 from radarsim.world import shapes
 
-#: What formulas in the file may use beside a piece's variables.
+#: Names available to formulas in the file, beside a piece's variables.
 _NAMES = {name: getattr(np, name) for name in ("arange", "arctan2", "cos", "hypot", "linspace", "pi", "sin")}
 _NAMES |= {"__builtins__": {}, "len": len, "max": max, "min": min, "range": range, "round": round}
 _ARITHMETIC = (
@@ -42,9 +42,9 @@ def make(kind: str, rng: np.random.Generator | None = None, material: str = "", 
     """Make a piece.
 
     Args:
-        kind: a key of `furniture.yaml`.
-        rng: draws what is not given.
-        material: of its `own` parts; default: as in the file.
+        kind: key in `furniture.yaml`.
+        rng: random generator for variables that are not given.
+        material: material of its `own` parts; default: as in the file.
         given: variables.
     """
     about, values = _table()[kind], dict[str, Any](given)
@@ -64,7 +64,7 @@ def make(kind: str, rng: np.random.Generator | None = None, material: str = "", 
 
 
 def evaluate(formula: object, values: Mapping[str, object]) -> Any:
-    """The value of a formula, or those of a list of them, from a file of this package."""
+    """Evaluate a formula, or a list of them, from a file of this package."""
     return eval(_compiled(_source(formula)), _NAMES, values)
 
 
@@ -74,7 +74,7 @@ def _table() -> dict[str, dict]:
 
 
 def _repeated(variables: list[tuple], values: dict, rng: np.random.Generator | None) -> Iterator[dict]:
-    """Values of a part's variables, for each combination of those that have several."""
+    """Yield a part's variables for each combination of those with several values."""
     if not variables:
         yield values
         return
@@ -85,7 +85,7 @@ def _repeated(variables: list[tuple], values: dict, rng: np.random.Generator | N
 
 
 def value(choice: object, values: dict, rng: np.random.Generator | None) -> Any:
-    """A uniform number between two (`from` and `to`), or what a formula gives."""
+    """Draw a uniform number between two (`from` and `to`), or evaluate a formula."""
     return _needed(rng).uniform(choice["from"], choice["to"]) if isinstance(choice, dict) else evaluate(choice, values)
 
 
@@ -101,7 +101,7 @@ def _source(formula: object) -> str:
 
 @cache
 def _compiled(source: str) -> CodeType:
-    """Arithmetic, comparisons, and calls of what `_NAMES` holds; nothing else can be in a formula."""
+    """Compile a formula of arithmetic, comparisons, and calls of names in `_NAMES`; nothing else is allowed."""
     tree = ast.parse(source, "furniture.yaml", "eval")
     calls = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
     odd = [node for node in ast.walk(tree) if not isinstance(node, _ARITHMETIC)]

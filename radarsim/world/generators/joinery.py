@@ -1,4 +1,4 @@
-"""What is put into openings of walls: door leaves and their frames, windows, glass walls.
+"""Fillings of wall openings: door leaves and their frames, windows, glass walls.
 
 Its pieces (`furniture.yaml`) are in the opening's own frame: x along the wall from the opening's low end, y across, 0
 in the middle of the wall and `inward` (+1 or -1) into the room, z up.
@@ -22,11 +22,11 @@ Part = tuple[str, trimesh.Trimesh, str]  # name, mesh, material
 
 
 def fill(opening: Opening, style: Style) -> Iterator[Part]:
-    """What an opening is filled with, in the world."""
+    """Yield the parts that fill an opening, in world coordinates."""
     x0, y0, _, x1, y1, _ = opening.span
     along_x = opening.side in "ns"
     origin = (x0, (y0 + y1) / 2, 0.0) if along_x else ((x0 + x1) / 2, y0, 0.0)
-    # Turned by a quarter, y points to -x.
+    # After a quarter turn, y points to -x.
     inward = {"n": -1, "s": 1, "e": 1, "w": -1}[opening.side]
     width, top = opening.high - opening.low, opening.top
     parts: list[Part] = []
@@ -51,18 +51,18 @@ def fill(opening: Opening, style: Style) -> Iterator[Part]:
 
 
 def _made(material: str, kind: str, **given: Any) -> list[Part]:
-    """A piece by what its materials are in an opening."""
+    """Make a piece, with its parts renamed by their material in an opening."""
     parts = make(kind, None, material, **given).parts
     named = {"window": "frame"}.get(kind, kind)
     return [("pane" if what != material else named, mesh, what) for what, mesh in parts.items()]
 
 
 def _leaf(opening: Opening, low: float, high: float, inward: int, face: float) -> list[Part]:
-    """A door leaf on its hinge, `face` (m) from the middle of the wall, with a handle on either side."""
+    """Door leaf on its hinge, `face` (m) from the middle of the wall, with a handle on either side."""
     about = {"width": high - low - 2 * _GAP, "thickness": 0.012 if opening.leaf == "glass" else 0.04}
     turn = -opening.hinge * inward * opening.angle
     x, yaw = (low + _GAP, turn) if opening.hinge < 0 else (high - _GAP, np.pi + turn)
-    # Shut, it lies within the opening; open, it clears the frame.
+    # A closed leaf lies within the opening; an open one clears the frame.
     out = 1 if opening.angle else -1
     place = (x, inward * (face + out * about["thickness"] / 2 + out * _GAP), 0), (0, 0, yaw)
     parts = _made(opening.leaf, "leaf", **about) + _made("metal", "handles", **about)
@@ -70,7 +70,7 @@ def _leaf(opening: Opening, low: float, high: float, inward: int, face: float) -
 
 
 def _glass_wall(width: float, top: float, door: tuple[float, float]) -> list[Part]:
-    """A frame of metal with a bay for a door, and panes beside and above it."""
+    """Metal frame with a bay for a door, and panes beside and above it."""
     half = BAR / 2
     low, high = door[0] - half, door[1] + half
     even = np.linspace(half, width - half, max(2, round(width / 1.3)) + 1)

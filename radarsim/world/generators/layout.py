@@ -1,4 +1,4 @@
-"""The plan of one floor: the skeleton's ground cut into rooms, and the doors, windows and glass walls between them."""
+"""Floor plan: the skeleton's ground divided into rooms, and the doors, windows and glass walls between them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ from radarsim.world.generators.skeleton import Block, Box, Skeleton
 from radarsim.world.generators.styles import Style
 from radarsim.world.generators.walls import Face
 
-#: Narrowest and widest room, m.
+#: Smallest and largest width of a room, m.
 NARROWEST, WIDEST = 2.8, 8.4
-#: From a corner to a door, m.
+#: Distance from a corner to a door, m.
 JAMB = 0.35
 #: Floor kept free in front of a door, m.
 APPROACH = 1.25
@@ -26,13 +26,13 @@ APPROACH = 1.25
 
 @dataclass(frozen=True)
 class Border:
-    """Where a room's wall has one thing behind it.
+    """Part of a room's wall with one neighbour behind it.
 
     Attributes:
-        room: whose wall it is.
+        room: room of the wall.
         side: "n", "s", "e" or "w".
         low, high: along the wall, m.
-        other: what lies behind; None: outside.
+        other: room behind the wall; None: outside.
     """
 
     room: Room
@@ -43,7 +43,7 @@ class Border:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Length along the wall, m."""
         return self.high - self.low
 
 
@@ -51,14 +51,14 @@ class FloorPlan:
     """One floor of a building.
 
     Args:
-        skeleton: of the building.
-        style: of the building.
-        rng: draws what is this floor's own.
+        skeleton: skeleton of the building.
+        style: style of the building.
+        rng: random generator of this floor.
 
     Attributes:
         rooms: all of them, corridors (kind ``corridor``) last.
         openings: doors, windows, glass walls.
-        columns: half sunk into the facade, m.
+        columns: columns half inside the facade, m.
     """
 
     def __init__(self, skeleton: Skeleton, style: Style, rng: np.random.Generator):
@@ -78,7 +78,7 @@ class FloorPlan:
     # Rooms
 
     def _split(self, block: Block) -> None:
-        """Rooms side by side, a whole number of modules wide, of a few widths that repeat."""
+        """Divide a block into rooms side by side, each a whole number of modules wide, with a few repeated widths."""
         rng, style = self._rng, self.style
         x0, y0, x1, y1 = block.box
         start, end = (x0, x1) if block.axis == 0 else (y0, y1)
@@ -101,7 +101,7 @@ class FloorPlan:
                 widths.append(last - excess)
             elif last < excess:
                 continue
-            elif widths:  # what is left is too narrow: the room before takes it, or they share
+            elif widths:  # the rest is too narrow: add it to the previous room, or share both
                 both = widths.pop() + last - excess
                 widths += [both] if both <= most else [both - both // 2, both // 2]
             else:
@@ -116,7 +116,7 @@ class FloorPlan:
     def _joined_at_corners(
         self, block: Block, cuts: list[tuple[float, float]], axes: Float[np.ndarray, "axis"]
     ) -> list[tuple[float, float]]:
-        """A room in a corner of the building may touch no corridor: it takes from its neighbour what it needs."""
+        """Extend a room in a corner of the building into its neighbour, if it would touch no corridor."""
         for last in (False, True):
             cuts = cuts[::-1] if last else cuts
             while len(cuts) > 1 and not self._reaches_corridor(block, *cuts[0]):
@@ -176,7 +176,7 @@ class FloorPlan:
                 k = int(rng.integers(2))
                 fronts[0], fronts[k] = fronts[k], fronts[0]
             self._front(fronts[0], number, must_open=room.name in joined)
-            # Rooms between two corridors are short cuts, or have their second door shut.
+            # Rooms between two corridors are passages, or have a closed second door.
             across = [b for b in fronts[1:] if b.side == OPPOSITE[fronts[0].side]]
             if across and room.kind not in ("stairs", "toilet", "storage") and rng.random() < 0.5:
                 self._front(across[0], number, must_open=rng.random() < 0.6)
@@ -184,7 +184,7 @@ class FloorPlan:
             self._suite_door(border)
 
     def _suites(self, rooms: list[Room]) -> list[Border]:
-        """Pairs of neighbours with a door between them; at least two."""
+        """Pairs of neighbouring rooms with a door between them; at least two."""
         shut = ("toilet", "stairs", "corridor")
         pairs = [b for room in rooms for b in self.borders[room.name]
                  if b.side in "en" and b.other and room.kind not in shut and b.other.kind not in shut
@@ -193,7 +193,7 @@ class FloorPlan:
         return chosen if len(chosen) >= 2 else pairs[:: max(1, len(pairs) // 2)]
 
     def _front(self, border: Border, number: int, must_open: bool) -> None:
-        """The wall between a room and a corridor: wide open, glazed, or with a door near one end."""
+        """Open the wall between a room and a corridor: entirely, by a glass wall, or by a door near one end."""
         rng, style, room = self._rng, self.style, border.room
         if room.kind == "lounge" and border.length > 2.6:
             self._open(border, border.low + 0.5, border.high - 0.5, "way", top=min(2.6, style.height - 0.3))
@@ -203,7 +203,7 @@ class FloorPlan:
         leaf, angle = self._leaf(must_open or room.kind == "stairs")
         if room.kind in ("stairs", "toilet", "storage") and leaf == "glass":
             leaf = "metal"
-        # Hinged at the end next to the corner, as far open as the corner allows.
+        # Hinged at the end next to the corner, open as far as the corner allows.
         free = low - border.low if at_low else border.high - low - DOOR
         angle = min(angle, np.pi / 2 + np.arcsin(np.clip((free - 0.2) / DOOR, -0.1, 0.35)))
         swing: dict[str, Any] = {"leaf": leaf, "angle": float(angle), "hinge": -1 if at_low else 1}
@@ -225,9 +225,9 @@ class FloorPlan:
         return leaf, 0.0 if share < doors.closed else np.deg2rad(gap)
 
     def _suite_door(self, border: Border) -> None:
-        """A doorway in the half of the wall away from the corridor, clear of the leaves there."""
+        """Add a doorway in the half of the wall away from the corridor, clear of the door leaves there."""
         doors = [o for o in self.openings if o.room in (border.room, border.other) and o.kind != "window"]
-        # Away from the corridor means away from the doors' wall.
+        # Away from the corridor: away from the wall with doors.
         low_side, high_side = ("w", "e") if border.side in "ns" else ("s", "n")
         low, high = border.low + 0.6, border.high - 0.6 - DOOR
         if any(o.side == low_side for o in doors):
@@ -247,7 +247,7 @@ class FloorPlan:
         self.openings.append(Opening(name, room, border.side, low, high, bottom, top, thickness, kind, other, **more))
 
     def _windows(self) -> None:
-        """Windows on the axes of the facade, in rooms and where a corridor meets it."""
+        """Add windows on the axes of the facade, in rooms and at the ends of corridors."""
         w, pitch = self.style.windows, self.skeleton.blocks[0].pitch
         for room in self.rooms:
             if room.kind == "stairs":
@@ -265,14 +265,14 @@ class FloorPlan:
                     self._open(border, middle - half, middle + half, "window", w.top, w.sill)
 
     def _faces_ground(self, border: Border) -> bool:
-        """Whether there is more of the building outside of a wall: a shaft, or a wing close by."""
+        """Whether another part of the building is outside of a wall: a shaft, or a wing close by."""
         thick = self.style.outer
         return self.skeleton.outline.intersects(
             area(*strip(border.room, border.side, border.low + 0.1, border.high - 0.1, thick + 0.02, thick + 1.0))
         )
 
     def _keep_ways(self) -> None:
-        """Mark the floor under leaves as taken, and that before doors and from door to door as to be kept free."""
+        """Mark the floor under door leaves as taken, and that in front of and between doors as kept free."""
         spots: dict[str, list[tuple[float, float]]] = {}
         for o in self.openings:
             if o.passage is None:
@@ -291,7 +291,7 @@ class FloorPlan:
             at = spots.get(room.name, [])
             if room.kind in ("corridor", "stairs"):
                 continue
-            # Shorter ways stand for the longer ones round about them.
+            # Only shorter paths are kept; longer ones follow them.
             for k in range(1, len(at)):
                 nearest = at[np.hypot(*(np.array(at[:k]) - at[k]).T).argmin()]
                 room.kept.append(LineString([nearest, at[k]]).buffer(0.55))
@@ -299,7 +299,7 @@ class FloorPlan:
     # Walls
 
     def _columns(self) -> list[Box]:
-        """Where walls between rooms meet the facade, and in the corners of large rooms."""
+        """Columns where walls between rooms meet the facade, and in the corners of large rooms."""
         what, width = self.style.column
         found: list[Box] = []
         large = [r for r in self.rooms if r.kind not in ("corridor", "stairs", "toilet") and min(r.size) >= 3.5]
@@ -313,9 +313,9 @@ class FloorPlan:
         return found
 
     def labels(self, found: list[Face]) -> Iterator[tuple[str, str]]:
-        """Name and material of what each face of the walls belongs to."""
+        """Yield name and material of the object that each face of the walls belongs to."""
         style = self.style
-        # Within the wall's thickness, short of its faces.
+        # Within the wall's thickness, away from its faces.
         reveals = [
             area(x0 - dx, y0 - dy, x1 + dx, y1 + dy)
             for o in self.openings
@@ -351,9 +351,9 @@ def _gap(room: Room, other: Room, side: str) -> float:
 
 
 def _borders(room: Room, rooms: list[Room], thickest: float) -> list[Border]:
-    """What lies behind the four walls of a room: others across walls up to a thickness (m), else the outside.
+    """Neighbours behind the four walls of a room: rooms across walls up to a thickness (m), otherwise the outside.
 
-    Where an other room begins the outside ends a wall's thickness before.
+    Where another room begins, the outside ends a wall's thickness earlier.
     """
     found = []
     for side in "nsew":

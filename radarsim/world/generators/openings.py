@@ -1,4 +1,4 @@
-"""Openings in the walls of a floor: doors, ways, windows, glass walls."""
+"""Openings in the walls of a floor: doors, passages, windows, glass walls."""
 
 from dataclasses import dataclass
 
@@ -16,11 +16,11 @@ OPPOSITE = {"n": "s", "s": "n", "e": "w", "w": "e"}
 
 @dataclass(frozen=True)
 class Opening:
-    """A hole in a wall.
+    """Opening in a wall.
 
     Attributes:
         name: unique.
-        room: into which a leaf opens.
+        room: room into which a leaf opens.
         side: of the room.
         low, high: along the wall, m.
         bottom, top: heights, m.
@@ -50,19 +50,19 @@ class Opening:
 
     @property
     def span(self) -> Span:
-        """As a box."""
+        """Box of the opening."""
         x0, y0, x1, y1 = strip(self.room, self.side, self.low, self.high, 0.0, self.thickness)
         return x0, y0, self.bottom, x1, y1, self.top
 
     @property
     def passage(self) -> tuple[float, float] | None:
-        """Where one can walk through, along the wall, if no leaf shuts it."""
+        """Passable interval along the wall, if no leaf closes it."""
         if self.kind == "window":
             return None
         return self.bay if self.kind == "glass wall" else (self.low, self.high)
 
     def leaf_area(self) -> Polygon:
-        """Floor under an open leaf, and a little around it."""
+        """Floor area under an open leaf, with a margin."""
         low, high = self.passage or (self.low, self.high)
         hinge = low if self.hinge < 0 else high
         tip = hinge - self.hinge * np.cos(self.angle) * (high - low), np.sin(self.angle) * (high - low)

@@ -1,4 +1,4 @@
-"""Rooms, and the site where things are put into them: no two on the same floor, none in a way."""
+"""Rooms, and the site where pieces are placed in them without overlap and without blocking doors."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,14 +17,14 @@ from radarsim.world.objects import SceneObject
 
 @dataclass
 class Room:
-    """A room between its walls' faces.
+    """Room between the faces of its walls.
 
     Attributes:
         name: unique.
         x0, y0, x1, y1: extent, m.
         kind: office, meeting, ... or corridor.
-        taken: floor area that is in use.
-        kept: floor area to be left free: in front of doors, ways between them.
+        taken: floor area in use.
+        kept: floor area to keep free: in front of doors, and paths between them.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Room:
 
     @property
     def center(self) -> tuple[float, float]:
-        """m."""
+        """Centre of the room, m."""
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
     @property
@@ -48,11 +48,11 @@ class Room:
 
     @cached_property
     def floor(self) -> Polygon:
-        """All of its floor."""
+        """Floor area of the room."""
         return area(self.x0, self.y0, self.x1, self.y1)
 
     def is_free(self, spot: Polygon) -> bool:
-        """Whether a piece of floor lies in the room and nothing stands there."""
+        """Whether a piece of floor lies in the room and is not in use."""
         return self.floor.contains(spot) and not any(spot.intersects(other) for other in self.taken + self.kept)
 
     def wall(self, side: str) -> tuple[float, float]:
@@ -60,7 +60,7 @@ class Room:
         return (self.x0, self.x1) if side in "ns" else (self.y0, self.y1)
 
     def wall_place(self, side: str, along: float, off: float) -> tuple[float, float, float]:
-        """Place and yaw of a piece with its back to the wall at a `side`, `off` (m) its face."""
+        """Position and yaw of a piece with its back to the wall at a `side`, at a distance `off` (m) from its face."""
         return {
             "s": (along, self.y0 + off, np.pi / 2),
             "n": (along, self.y1 - off, -np.pi / 2),
@@ -70,13 +70,13 @@ class Room:
 
 
 class Site:
-    """A floor being built.
+    """Floor under construction.
 
     Attributes:
-        rng: draws everything.
+        rng: random generator.
         height: of the ceilings, m.
-        density: of furniture: number of pieces, as a share of the usual.
-        objects: so far.
+        density: number of pieces of furniture relative to the usual.
+        objects: objects so far.
     """
 
     def __init__(self, rng: np.random.Generator, height: float, density: float = 1.0):
@@ -85,29 +85,29 @@ class Site:
         self._count: dict[str, int] = {}
 
     def number(self, usual: float) -> int:
-        """How many pieces there are where `usual` ones would be; the density's fraction of one is drawn."""
+        """Number of pieces for a usual number, scaled by the density; a fraction is rounded at random."""
         return int(usual) if self.density == 1 else int(int(usual) * self.density + self.rng.random())
 
     def add(self, name: str, mesh: trimesh.Trimesh, what: str) -> None:
-        """Add an object of a material. Panes are sheets, all else is the surface of a body."""
+        """Add an object of a material. Panes are sheets, everything else is the surface of a body."""
         self.objects.append(SceneObject(name, mesh, material(what), solid=what != "glass"))
 
     def put(self, room: Room, piece: Piece, x: float, y: float, yaw: float) -> None:
-        """Stand a piece in a room and take its floor area."""
+        """Place a piece in a room and mark its floor area as taken."""
         number = self._count[room.name + piece.kind] = self._count.get(room.name + piece.kind, 0) + 1
         for what, part in piece.parts.items():
             self.add(f"{room.name} {piece.kind} {number} {what}", shapes.placed(part, (x, y, 0), (0, 0, yaw)), what)
         room.taken.append(footprint(piece, x, y, yaw))
 
     def put_if_free(self, room: Room, piece: Piece, x: float, y: float, yaw: float, margin: float = 0.01) -> bool:
-        """Put a piece where nothing stands within a margin (m), or not at all; whether it was put."""
+        """Place a piece if the floor is free within a margin (m); return whether it was placed."""
         free = room.is_free(footprint(piece, x, y, yaw).buffer(margin))
         if free:
             self.put(room, piece, x, y, yaw)
         return free
 
     def seat(self, room: Room, x: float, y: float, yaw: float, away: float = 0.82) -> None:
-        """A chair in front of what stands at a place, turned to it up to half a radian."""
+        """Place a chair in front of a place, turned towards it to within half a radian."""
         turn = yaw + np.pi + self.rng.uniform(-0.5, 0.5)
         piece = make("chair")
         x, y = x + away * np.cos(yaw), y + away * np.sin(yaw)
@@ -115,7 +115,7 @@ class Site:
             self.put(room, piece, x, y, turn)
 
     def lamps(self, room: Room, piece: Piece, spacing: float, yaw: float = np.pi / 2) -> None:
-        """Ceiling lamps on a regular grid; they take no floor."""
+        """Add ceiling lamps on a regular grid; they take no floor."""
         nx, ny = (max(1, round(side / spacing)) for side in room.size)
         for i in range(nx):
             for j in range(ny):

@@ -1,4 +1,4 @@
-"""What the floors of a building share: its outline, corridors, stairs, and the ground for rows of rooms.
+"""Skeleton shared by the floors of a building: outline, corridors, stairs, and the ground for rows of rooms.
 
 Two long corridors run along x and are joined by two or three cross corridors, so that there are rings to walk. Rows of
 rooms lie along the two facades, at the ends, and in the core between the corridors:
@@ -23,11 +23,11 @@ from radarsim.world.generators.styles import Style
 
 Box = tuple[float, float, float, float]  # x0 y0 x1 y1, m
 
-#: The long corridors are this long at least between the far sides of the cross corridors, and at most, m.
+#: Smallest and largest length of the long corridors between the far sides of the cross corridors, m.
 LONG = 21.0, 36.0
-#: A ring longer than this gets a cross corridor in its middle, m.
+#: Length of a ring above which it gets a cross corridor in its middle, m.
 LONGEST_RING = 78.0
-#: Rows of rooms in the core are at least so deep, m.
+#: Smallest depth of rows of rooms in the core, m.
 CORE_ROW = 3.9
 STAIRS, TOILET, STUB = (5.6, 3.0, 1.9)  # sizes along the core, m
 
@@ -53,12 +53,12 @@ class Block:
 
 @dataclass
 class Skeleton:
-    """See the head of this file.
+    """Outline, corridors and blocks; see the sketch at the top of this file.
 
     Attributes:
         corridors: by name, m; they touch where they meet.
         blocks: ground for rooms, in reading order.
-        solid: ground that is in none of both: shafts at the ends of stubs.
+        solid: remaining ground: shafts at the ends of stubs.
         rings: lengths of the rings of corridors, along their middles, m.
         outline: of the building, outer faces.
     """
@@ -70,13 +70,13 @@ class Skeleton:
     outline: Polygon = field(default_factory=Polygon)
 
     def ground(self, wall: float) -> list[Box]:
-        """Boxes whose union is the whole floor with outer walls of a thickness (m)."""
+        """Boxes whose union is the whole floor including outer walls of a thickness (m)."""
         boxes = [*self.corridors.values(), *(b.box for b in self.blocks), *self.solid]
         return [(x0 - wall, y0 - wall, x1 + wall, y1 + wall) for x0, y0, x1, y1 in boxes]
 
 
 def skeleton(style: Style, rng: np.random.Generator) -> Skeleton:
-    """A building of a style."""
+    """Draw the skeleton of a building of a style."""
     thick, wall = style.outer, style.inner
     width = round(rng.uniform(*style.corridor), 2)
     pitch = rng.uniform(*style.module)
@@ -128,7 +128,7 @@ def skeleton(style: Style, rng: np.random.Generator) -> Skeleton:
             high = north_0 - wall if runs_on["n", k] else north_1
             plan.blocks.append(Block(_cm(a, low, b, high), 1, "rooms", pitch))
 
-    # The core, by stretches between cross corridors and rows.
+    # The core, in sections between cross corridors and rows.
     stretches = [(a + width + wall, b - wall) for a, b in zip(crossings[:-1], crossings[1:], strict=True)]
     levels = south_1 + wall + np.concatenate([[0], np.cumsum(core + wall)])
     stairs_left, toilets_left, stubs_left = (2 if east - west > 27 else 1), 2, 1 + (rng.random() < 0.5)
@@ -158,7 +158,7 @@ def skeleton(style: Style, rng: np.random.Generator) -> Skeleton:
 
 
 def _stub(plan: Skeleton, at: float, low: float, high: float, southward: bool, wall: float) -> None:
-    """A dead end from a corridor into the core; a shaft behind it reaches to the next wall."""
+    """Add a dead end from a corridor into the core; a shaft behind it extends to the next wall."""
     shaft = 0.9
     if southward:
         plan.corridors[f"stub {at:.0f}"] = _cm(at, low - wall, at + STUB, high - shaft)

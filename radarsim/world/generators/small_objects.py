@@ -1,7 +1,7 @@
 """Small objects down to 2 cm on the tops, walls and ceilings of a scene (`small_objects.yaml`).
 
-What is smaller is a layer of points (`radarsim.propagation.clutter`). Random numbers follow from the surfaces, not from
-the walk's seed: the same surfaces have the same objects, in ray tests, cameras, planned paths and truth alike.
+Smaller objects are point scatterers (`radarsim.propagation.clutter`). Random numbers depend on the surfaces, not on
+the walk's seed: the same surfaces have the same objects in ray tests, cameras, planned paths and ground truth.
 """
 
 from collections.abc import Sequence
@@ -23,16 +23,16 @@ from radarsim.world.shapes import joined
 
 @dataclass(frozen=True, kw_only=True)
 class SmallObject:
-    """A kind of objects.
+    """Kind of small object.
 
     Attributes:
         surface: tops, walls or ceilings.
-        often: at level 1: number per square metre of tops and ceilings, per metre of wall.
-        least, most: along, across and off the surface, m; what is round is as thick as the box around it.
+        often: density at level 1: per square metre of tops and ceilings, per metre of wall.
+        least, most: along, across and off the surface, m; round shapes fill their bounding box.
         shape: of `furniture.yaml`.
-        material: of all of it.
-        height: of its middle over the floor on a wall, lowest and highest, m.
-        lamp: hangs only where no other lamp hangs.
+        material: material of all of it.
+        height: lowest and highest height of its centre above the floor, on a wall, m.
+        lamp: placed only away from other lamps.
     """
 
     surface: Literal["top", "wall", "ceiling"]
@@ -47,12 +47,12 @@ class SmallObject:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """What runs along a wall.
+    """Kind of object that runs along a wall.
 
     Attributes:
-        share: of walls that have it at level 1.
+        share: fraction of walls with it at level 1.
         across, depth: of its section, m.
-        height: of its middle over the floor, or, negative, below the ceiling, m.
+        height: height of its centre above the floor, or, if negative, below the ceiling, m.
         least: shortest length, m.
         shape: of `furniture.yaml`.
         material: of all of it.
@@ -72,15 +72,15 @@ RUNS = {kind: Run(**about) for kind, about in _FILE["runs"].items()}
 OBJECTS = {
     kind: SmallObject(**about | {"often": evaluate(about["often"], {})}) for kind, about in _FILE["objects"].items()
 }
-#: Largest number of places tried in a scene; a floor of the largest buildings needs some ten thousand.
+#: Largest number of placements tried in a scene; a floor of the largest buildings needs some ten thousand.
 MOST = 200_000
 #: m: length of the pieces in which runs are tested.
 PIECE = 0.1
 #: m: highest ceiling.
 _HIGHEST = 20.0
-#: Rim and free space in front of what is on tops, walls and ceilings, m (`Surroundings.fits`).
+#: Margin and free space in front of objects on tops, walls and ceilings, m (`Surroundings.fits`).
 ROOM = {"top": (0.005, 0.02), "wall": (0.04, 0.1), "ceiling": (0.12, 0.05)}
-#: The same of runs, and how far to the sides.
+#: The same for runs, and free space to the sides.
 ALONG = (-0.003, 0.005, -0.005)
 
 
@@ -89,7 +89,7 @@ def small_objects(objects: Sequence[SceneObject], level: float) -> list[SceneObj
 
     Args:
         objects: the scene's surfaces.
-        level: 1: as many as is usual; 0: none.
+        level: 1: the usual number; 0: none.
 
     Raises:
         InputError: more than `MOST` places would be tried.
@@ -108,13 +108,13 @@ def small_objects(objects: Sequence[SceneObject], level: float) -> list[SceneObj
 
 
 def shaped(about: SmallObject | Run, size: Float[np.ndarray, "3"]) -> trimesh.Trimesh:
-    """An object of a kind and size, on its back."""
+    """Make an object of a kind and size, on its back."""
     along, across, high = size
     return make(about.shape, material=about.material, along=along, across=across, high=high).parts[about.material]
 
 
 def placed(objects: Sequence[SceneObject], level: float) -> dict[str, Spots]:
-    """The boxes around the objects of each kind."""
+    """Bounding boxes of the objects of each kind."""
     if level == 0 or not objects:
         return {}
     around = Surroundings(objects)
@@ -142,7 +142,7 @@ def _wanted(around: Surroundings) -> float:
 
 
 def _scattered(about: SmallObject, around: Surroundings, level: float, rng: np.random.Generator) -> Spots:
-    """Places of a kind: a Poisson process, where there is room."""
+    """Random positions of a kind: a Poisson process, restricted to free places."""
     if about.surface == "wall":
         place, normal = _on_walls(about, around, level, rng)
         along = np.cross([0.0, 0.0, 1.0], normal)
@@ -163,7 +163,7 @@ def _scattered(about: SmallObject, around: Surroundings, level: float, rng: np.r
 def _on_walls(
     about: SmallObject, around: Surroundings, level: float, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-    """Places on walls at a kind's height, and normals."""
+    """Positions on walls at a kind's height, and normals."""
     begin, normal, length = around.walls
     on = np.repeat(np.arange(len(length)), rng.poisson(level * about.often * length))
     place = begin[on] + (rng.random(len(on)) * length[on])[:, None] * np.cross([0.0, 0.0, 1.0], normal[on])
@@ -172,7 +172,7 @@ def _on_walls(
 
 
 def _along(run: Run, around: Surroundings, level: float, rng: np.random.Generator) -> Spots:
-    """Places of a run: all of each wall that has it, as far as that is free."""
+    """Positions of a run: the free parts of all walls that have it."""
     begin, normal, length = around.walls
     wanted = (rng.random(len(length)) < level * run.share) & (length > run.least)
     begin, normal, length = begin[wanted], normal[wanted], length[wanted]
@@ -194,7 +194,7 @@ def _along(run: Run, around: Surroundings, level: float, rng: np.random.Generato
     good &= around.fits(pieces, *ALONG) & around.above_floor(pieces)
     if run.height <= run.across / 2 and run.height > 0:
         good &= around.on_floor(pieces)
-    # whole stretches, off the walls that they end at
+    # contiguous pieces, away from the walls at their ends
     edge = np.flatnonzero(np.diff(good, prepend=False) | (np.diff(line, prepend=-1) != 0))
     last = np.append(edge[1:], len(line)) - 1
     edge, last = edge[good[edge]], last[good[edge]]

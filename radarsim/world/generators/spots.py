@@ -1,4 +1,4 @@
-"""Where something can be put: places on tops, walls and ceilings, and ray tests on what stands around them."""
+"""Free places for objects on tops, walls and ceilings, found by ray tests of their surroundings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,32 +14,32 @@ from jaxtyping import Bool, Float, Int
 from radarsim.world.objects import SceneObject
 from radarsim.world.shapes import loose, scattered, tested
 
-#: Heights over the floor, m: of tops that people put things on, of ceilings, and of what is still there: only a wall.
+#: Heights above the floor, m: of tops used as shelves, of ceilings, and the height from which a surface is a wall only.
 TOPS, CEILINGS, WALLS = (0.6, 2.0), 2.0, 2.25
-#: m: narrower walls are posts and the sides of openings; and gaps in walls that are none.
+#: m: narrower walls are posts and the sides of openings; narrower gaps in walls are ignored.
 NARROW, SEAM = 0.5, 0.02
-#: Cosines of what is level and of what is upright.
+#: Cosines for horizontal and for vertical surfaces.
 LEVEL, UPRIGHT = 0.98, 0.05
-#: What buildings are made of. Where it is as high as tops it is steps and landings, which people walk on, or the sill
-#: of an opening: nothing is put there.
+#: Materials of buildings. At the height of tops their surfaces are steps, landings or sills of openings, on which
+#: nothing is placed.
 BUILT = {"concrete", "brick", "plasterboard", "ceiling board", "asphalt", "carpet", "floorboard"}
-#: m: from where a ray looks back at a surface, and how far from that surface it may end.
+#: m: distance from which a ray looks back at a surface, and tolerance of its end.
 LIFT, OFF = 0.01, 0.002
-#: m: as far from a wall or ceiling a ray looks for the floor.
+#: m: distance from a wall or ceiling at which a ray looks for the floor.
 ASIDE = 0.08
 DOWN = np.array([0.0, 0.0, -1.0])
-#: m: as high as no ceiling is.
+#: m: higher than any ceiling.
 _SKY = 1e3
-#: Where rays look at a back, as shares of its half sides.
+#: Points of a back that rays test, as fractions of its half sides.
 _GRID = np.array(list(product(np.linspace(-1, 1, 5), repeat=2)))
-#: m: what is larger is looked through by more rays.
+#: m: larger objects are tested by more rays.
 _SMALL = 0.12
 _THREE, _OUT = (-1.0, 0.0, 1.0), (0.15, 0.55, 1.0)
 
 
 def _through(side: int) -> Float[np.ndarray, "ray 2 3"]:
-    """Ends of rays through the space that a thing takes, so many beside one another: shares of half its sides, and of
-    how far it stands off."""
+    """Ends of rays through the space of an object, a grid of `side` by `side` rays: fractions of half its sides, and of
+    its depth."""
     rows = np.linspace(-1, 1, side)
     return np.array(
         [[(x, y, 0.0), (x, y, 1.0)] for x, y in product(_THREE, repeat=2)]
@@ -49,9 +49,9 @@ def _through(side: int) -> Float[np.ndarray, "ray 2 3"]:
 
 
 _FEW, _MANY = _through(5), _through(25)
-#: From where on a back rays look out of a body that all is inside of; one alone may graze a face.
+#: Points of a back from which rays test whether a body encloses everything; one alone may graze a face.
 _EYES = np.array([(0.0, 0.0, 0.0), (0.31, 0.17, 0.0), (-0.23, 0.41, 0.0)])
-#: How far around a lamp's place there is no other, m.
+#: Smallest distance between lamps, m.
 UNLIT = np.arange(0.2, 1.6, 0.2)
 
 
@@ -79,7 +79,7 @@ class Spots:
 
     @classmethod
     def joined(cls, parts: Sequence["Spots"]) -> "Spots":
-        """All of several."""
+        """Concatenate several sets of boxes."""
         columns = ("place", "along", "normal", "size")
         return cls(*(np.concatenate([np.zeros((0, 3)), *(getattr(p, name) for p in parts)]) for name in columns))
 
@@ -101,7 +101,7 @@ class Spots:
         return self.place[:, None] + np.einsum("pd,sd,sdx->spx", shares, half, self.axes)
 
     def apart(self) -> Bool[np.ndarray, "spot"]:
-        """Which of them overlap none that comes earlier and is kept."""
+        """Mask of boxes that overlap no earlier box that is kept."""
         corners = self.points(np.array(list(product((-1, 1), (-1, 1), (0, 1))), float))
         low, high = corners[..., 2].min(axis=1), corners[..., 2].max(axis=1)
         outline = shapely.convex_hull(shapely.multipoints(corners[..., :2]))
@@ -114,10 +114,10 @@ class Spots:
 
 
 class Surroundings:
-    """The surfaces of a place, and rays between them.
+    """Surfaces of a place, and rays between them.
 
     Args:
-        objects: what stands there.
+        objects: objects in the place.
 
     Attributes:
         floor: height of the floor, m.
@@ -135,7 +135,7 @@ class Surroundings:
         self._world, self._tensor = tested(self._corners)
         up, height = self._normals[:, 2], self._corners[:, :, 2].mean(axis=1)
         rising = np.flatnonzero(up > LEVEL)
-        # floors are among the lowest that faces up, but for what lies astray in scans
+        # floors are among the lowest upward faces, except for outliers in scans
         order = rising[np.argsort(height[rising], kind="stable")]
         total = np.cumsum(self._areas[order])
         low = height[order[np.searchsorted(total, 0.05 * total[-1])]] if len(order) else self._corners[..., 2].min()
@@ -143,32 +143,32 @@ class Surroundings:
 
     @property
     def seed(self) -> int:
-        """A number that is the same for the same surfaces: their corners, cut to 0.1 mm where no drawing has one."""
+        """Seed from the surfaces: their corners, truncated to 0.1 mm at an offset that no drawing uses."""
         return int.from_bytes(sha256(np.floor(self._corners * 1e4 + 0.37).astype(np.int64).tobytes()).digest()[:8])
 
     @cached_property
     def tops(self) -> Int[np.ndarray, "triangle"]:
-        """Triangles of tops."""
+        """Indices of the triangles of tops."""
         height = self._corners[:, :, 2].mean(axis=1) - self.floor
         able = ~(self._clear | self._built) & (height > TOPS[0]) & (height < TOPS[1])
         return np.flatnonzero(able & (self._normals[:, 2] > LEVEL))
 
     @cached_property
     def ceilings(self) -> Int[np.ndarray, "triangle"]:
-        """Triangles of ceilings."""
+        """Indices of the triangles of ceilings."""
         above = self._corners[:, :, 2].mean(axis=1) - self.floor > CEILINGS
         return np.flatnonzero(~self._clear & above & (self._normals[:, 2] < -LEVEL))
 
     @cached_property
     def walls(self) -> tuple[Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall"]]:
-        """Walls: where each begins on the floor on its left, seen from before it, m; its normal; its length, m."""
+        """Walls: start on the floor at the left as seen from the front, m; normal; length, m."""
         begin, normal, length = _straight(*self._lines)
         wide = length > NARROW
         return begin[wide], normal[wide], length[wide]
 
     @property
     def _lines(self) -> tuple[Float[np.ndarray, "line 2 3"], Float[np.ndarray, "line 3"]]:
-        """What is still there so high up: lines on the floor, left to right, one of a triangle, m; and normals."""
+        """Walls at that height: lines on the floor, left to right, one per triangle, m; and normals."""
         level = self.floor + WALLS
         rows = np.flatnonzero((np.abs(self._normals[:, 2]) < UPRIGHT) & ~self._clear)
         wall = loose(self._corners[rows])
@@ -182,24 +182,24 @@ class Surroundings:
         return lines, normals
 
     def area(self, some: Int[np.ndarray, "triangle"]) -> float:
-        """Of some triangles, m^2."""
+        """Total area of some triangles, m^2."""
         return float(self._areas[some].sum())
 
     def drawn(
         self, rng: np.random.Generator, some: Int[np.ndarray, "triangle"], count: int
     ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-        """Random places on some triangles, and the normals there."""
+        """Random positions on some triangles, and the normals there."""
         total = np.cumsum(self._areas[some])
         which = rng.random(count)
         on = some[np.minimum(np.searchsorted(total, which * total[-1]), len(some) - 1)] if count else some[:0]
         return scattered(self._corners[on], rng), self._normals[on]
 
     def fits(self, spots: Spots, rim: float, front: float, sides: float = 0.005) -> Bool[np.ndarray, "spot"]:
-        """Whether whole backs lie on surfaces, and nothing is in the way.
+        """Whether whole backs lie on surfaces, without an obstacle.
 
         Args:
-            rim: so far around a back its surface goes on, m.
-            front, sides: so far in front and to the sides all is free, m.
+            rim: margin of the surface around a back, m.
+            front, sides: free space in front and to the sides, m.
         """
         back = spots.points(np.column_stack([_GRID, np.zeros(len(_GRID))]), (rim, 0.0))
         lifted = back + LIFT * spots.normal[:, None]
@@ -218,20 +218,20 @@ class Surroundings:
         return lying & clear & ~behind.all(axis=1)
 
     def above_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
-        """Whether there is anything below: outside of a building there is not."""
+        """Whether there is a surface below, as everywhere inside a building."""
         return np.isfinite(self._hit(spots.place + ASIDE * spots.normal, DOWN)[0])
 
     def on_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
-        """Whether the lower ends of what is on a wall stand on a floor."""
+        """Whether the lower ends of objects on a wall have a floor below."""
         foot = spots.points(np.array([(x, -1.0, 1.0) for x in _THREE])) + [0, 0, LIFT]
         return np.all(np.abs(self._hit(foot, DOWN)[0] - LIFT) < OFF, axis=1)
 
     def headroom(self, spots: Spots) -> Float[np.ndarray, "spot"]:
-        """How high something is over what is on a wall, m; very high: nothing."""
+        """Height of the surface above objects on a wall, m; very large if there is none."""
         return np.minimum(self._hit(spots.place + ASIDE * spots.normal, -DOWN)[0], _SKY)
 
     def unlit(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
-        """Whether nothing hangs from the ceiling near by: no lamp."""
+        """Whether no lamp hangs from the ceiling nearby."""
         turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
         around = np.stack(np.broadcast_arrays(np.cos(turn)[:, None], np.sin(turn)[:, None], 0.0), axis=2)
         eye = spots.place - [0, 0, 0.3]
@@ -252,7 +252,7 @@ class Surroundings:
 def _straight(
     lines: Float[np.ndarray, "line 2 3"], normals: Float[np.ndarray, "line 3"]
 ) -> tuple[Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall"]]:
-    """Lines in line as one: where each begins on the left, its normal, its length."""
+    """Join collinear lines: start on the left, normal, length."""
     along = np.cross([0.0, 0.0, 1.0], normals)
     offset, low, high = (
         np.einsum("ld,ld->l", *pair) for pair in ((lines[:, 0], normals), (lines[:, 0], along), (lines[:, 1], along))

@@ -1,7 +1,7 @@
 """Styles of buildings (`styles.yaml`): materials, sizes and densities; four after the paper's, and `office`.
 
-Lengths in m; a pair of numbers is a range that a building draws from; shares and chances lie in 0...1; weights are
-relative.
+Lengths in m; a pair of numbers is a range from which a building draws; shares and probabilities are in 0...1; weights
+are relative.
 """
 
 from dataclasses import dataclass, field
@@ -47,7 +47,7 @@ class Doors:
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """One style.
+    """Style of a building.
 
     Attributes:
         height: floor to ceiling, m.
@@ -59,7 +59,7 @@ class Style:
             corridor walls.
         ceiling: material.
         floors: material by kind of room; "" for all others.
-        windows, doors: see there.
+        windows, doors: see `Windows` and `Doors`.
         glazed: share of rooms with a glass wall to the corridor.
         suites: chance that neighbouring rooms are joined by a door.
         column: material and width of columns at the facade's axes (0: none), m.

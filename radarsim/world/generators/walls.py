@@ -1,8 +1,8 @@
-"""Walls with openings: from solid boxes minus opening boxes to the rectangles that can be seen.
+"""Walls with openings: visible rectangles from solid boxes minus opening boxes.
 
-All boxes are axis-aligned, so the boundary of the union is found exactly on the grid of their coordinates: a cell is
-solid or not, and a face lies between a solid and an open cell. No face is hidden, none lies on another, and each is a
-rectangle with corners of its own, so that it stays one planar facet.
+All boxes are axis-aligned, so the boundary of the union is exact on the grid of their coordinates: a cell is
+solid or not, and a face separates a solid and an open cell. No face is hidden or coincides with another, and each is a
+rectangle with its own corners, so that it remains one planar facet.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ class Face:
 
     @property
     def area(self) -> float:
-        """m^2."""
+        """Area of the face, m^2."""
         return (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
 
     @property
@@ -51,8 +51,8 @@ class Face:
 def faces(solids: list[Span], openings: list[Span], pillars: Sequence[Span] = ()) -> list[Face]:
     """Boundary of the union of `solids` minus the union of `openings`, apart from its lowest and highest plane.
 
-    Those two are floor and ceiling, which belong to the rooms. Upright faces run as high as they can, then as wide.
-    `pillars` are solid wherever they stand, in openings too.
+    Those two are floor and ceiling, which belong to the rooms. Vertical faces are extended in height first, then in
+    width. `pillars` are solid everywhere, in openings too.
     """
     boxes = np.array([*solids, *openings, *pillars], float).round(6)
     grid = [np.unique(boxes[:, [axis, axis + 3]]) for axis in range(3)]

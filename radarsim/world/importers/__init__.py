@@ -1,7 +1,7 @@
-"""Scenes from foreign files, one module per format.
+"""Import of scenes from other formats, one module per format.
 
-A format reads its file as `Part`s. What follows is the same for all: metres, z up, floor at z = 0, clean triangles, a
-material each, and a scene file with its meshes in a folder beside it.
+A format module reads its file as `Part`s. The rest is common: metres, z up, floor at z = 0, clean triangles, one
+material per part, and a scene file with its meshes in a folder beside it.
 """
 
 import os
@@ -27,20 +27,20 @@ from radarsim.world.importers.shells import turned_to_rooms
 from radarsim.world.importers.upright import up_axis
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-#: Largest extent of a building, m; what seems larger or smaller is likely in other units.
+#: Largest extent of a building, m; a larger or smaller one probably has other units.
 _LIKELY = (1.5, 300.0)
 _STOREY = 2.7  # m
 _LARGEST = 2000.0  # m; ray tests compute in single precision
-#: A floor lies within this share of a mesh's height, or so many m, from its lowest corner; what is higher is a ceiling
-#: if it covers this share of the mesh from above, within so many m.
+#: Range of a floor's height above a mesh's lowest corner, as a fraction of its height and in m; and the fraction of the
+#: mesh's plan that a higher surface, a ceiling, covers, within the tolerance in m.
 _LOW, _LEAST_ROOM, _COVERS, _THICK = 0.5, 1.0, 0.5, 0.3
-#: Scenes that lie further from the origin are moved to it, m.
+#: Distance from the origin beyond which a scene is moved to it, m.
 _FAR = 500.0
 
 
 @dataclass(frozen=True)
 class Row:
-    """What became of a part: its name, material, why that material, triangles, area (m^2)."""
+    """Result for a part: its name, material, reason for that material, triangles, area (m^2)."""
 
     part: str
     material: str
@@ -51,7 +51,7 @@ class Row:
 
 @dataclass
 class Imported:
-    """A scene file that was written, what became of each part, and what the user should know."""
+    """Result of an import: the scene file, the result for each part, and remarks for the user."""
 
     path: Path
     rows: list[Row]
@@ -60,21 +60,21 @@ class Imported:
 
 @dataclass(frozen=True)
 class Options:
-    """How a foreign file is read.
+    """Options of an import.
 
     Attributes:
         materials: YAML file of patterns, see `MaterialMap`.
-        default: material of parts whose names say nothing; default: plasterboard, and concrete of whole rooms.
-        units: of a mesh or XML scene, one of `UNITS`; default: m, but of a mesh what makes a building of it.
-        up: ``y`` or ``z``; default: what glTF and OBJ meshes look like (`upright`), z of others.
-        floor: bring the floor of a mesh or XML scene to z = 0.
-        budget: triangles; larger meshes are decimated.
+        default: material of parts without a known name; default: plasterboard, and concrete for whole rooms.
+        units: of a mesh or XML scene, one of `UNITS`; default: m, or, for a mesh, the unit that gives a plausible size.
+        up: ``y`` or ``z``; default: estimated from glTF and OBJ meshes (`upright`), z for others.
+        floor: move the floor of a mesh or XML scene to z = 0.
+        budget: largest number of triangles; larger meshes are decimated.
         height: of the walls of a map or log, m.
-        thickness: of its thinnest walls, m.
-        resolution: of a log's cells, m.
+        thickness: smallest thickness of its walls, m.
+        resolution: size of a log's cells, m.
 
     Raises:
-        InputError: an unusable one.
+        InputError: an option is out of range.
     """
 
     materials: Path | None = None
@@ -111,11 +111,11 @@ def import_scene(
         source: ``.glb .gltf .obj .ply .stl``, a Mitsuba or Sionna ``.xml``, a ROS map's ``.yaml`` or picture, a CARMEN
             ``.log`` or ``.log.gz``, or ``.scans.npz`` with its ``.truth.tum``.
         output: scene file (.yaml), or a folder for one with the source's name. Its meshes go to `NAME.meshes` beside.
-        options: how to read it.
-        progress: called with a stage's name, steps done, steps in all.
+        options: options of the import.
+        progress: called with a stage's name, steps done, total steps.
 
     Raises:
-        InputError: nothing usable in the source, or options that do not fit it.
+        InputError: no usable content in the source, or options that do not fit it.
     """
     source, output = Path(source), Path(output)
     if not source.is_file():
@@ -183,7 +183,7 @@ def _fit(
     if extent.max() > _LARGEST:
         raise InputError(f"{source}: is {extent.max():.3g} m long in {units}, expected at most {_LARGEST:g} m")
     if not _LIKELY[0] <= extent.max() <= _LIKELY[1]:
-        remarks.append(f"it is {extent.max():.3g} m long, which is odd for a building; --units says what its units are")
+        remarks.append(f"it is {extent.max():.3g} m long, unusual for a building; --units sets its units")
     if extent[2] > max(2.0, 2 * extent[:2].max()):
         remarks.append(f"it is higher than long with {up} up; --up {'z' if up == 'y' else 'y'} may be meant")
     found = []
@@ -202,7 +202,7 @@ def _fit(
     parts = [_flat(part, source, number, len(parts), remarks, progress) for number, part in enumerate(parts, 1)]
     parts, rooms = turned_to_rooms(parts)
     if rooms:
-        remarks.append(f"{', '.join(rooms)}: closed around all else, taken for a room, its faces turned inwards")
+        remarks.append(f"{', '.join(rooms)}: closed around all else, treated as a room with its faces turned inwards")
     _place(parts, options.floor, remarks)
     total = sum(len(part.mesh.faces) for part in parts)
     if total > options.budget:
@@ -215,14 +215,14 @@ def _fit(
 def _flat(
     part: Part, source: Path, number: int, count: int, remarks: list[str], progress: Callable[..., object]
 ) -> Part:
-    """A scanned part with its planes flat."""
+    """Flatten the planes of a scanned part."""
     found = flatten(part.mesh)
     progress("finding planes", number, count)
     if found is None:
         return part
     remarks.append(
         f"{part.name}: {found.planes} planes ({found.share:.0%} of its area) made flat, {found.noise * 1e3:.1f} mm RMS "
-        "of noise taken away"
+        "of noise removed"
     )
     return clean(replace(part, mesh=found.mesh), str(source)) or part
 
@@ -237,30 +237,30 @@ def _extent(parts: list[Part]) -> np.ndarray:
 
 
 def _up(parts: list[Part], source: Path, remarks: list[str]) -> str:
-    """The axis that points up, said where a file could have either."""
+    """Up axis of a mesh, with a remark if the format allows either."""
     suffix = source.suffix.lower()
     if suffix not in (".glb", ".gltf", ".obj"):
         return "z"
     up, why = up_axis(parts, "z" if suffix == ".obj" else "y")
-    remarks.append(f"{up} is taken for up ({why}); --up says otherwise")
+    remarks.append(f"{up} is taken as up ({why}); --up overrides this")
     return up
 
 
 def _guess(parts: list[Part], remarks: list[str]) -> str:
-    """Metres, unless that is too large and another unit makes a building of it."""
+    """Unit of a mesh: metres, unless that is too large and another unit gives a plausible building."""
     extent = _extent(parts)
     likely = [unit for unit in ("cm", "mm") if 2.5 <= extent.max() * UNITS[unit] <= 100]
     if extent.max() <= _LIKELY[1] or not likely:
         return "m"
-    # A storey's height tells cm from mm.
+    # The height of a storey distinguishes cm from mm.
     unit = min(likely, key=lambda unit: abs(np.log(max(extent[2], 1e-9) * UNITS[unit] / _STOREY)))
     size = extent.max() * UNITS[unit]
-    remarks.append(f"it is {extent.max():.4g} long, taken as {unit} ({size:.3g} m); --units says what its units are")
+    remarks.append(f"it is {extent.max():.4g} long, taken as {unit} ({size:.3g} m); --units overrides this")
     return unit
 
 
 def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:
-    """Bring the floor to z = 0 and a scene from afar to the origin, in place; a room without a floor gets one."""
+    """Move the floor to z = 0 and a distant scene to the origin, in place; add a floor to a room without one."""
     corners = _corners(parts)
     low, high = corners.min(axis=0), corners.max(axis=0)
     shift = np.zeros(3)
@@ -272,7 +272,7 @@ def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:
         shift[2] = -low[2] if lacks else -level
         if lacks and area > _COVERS * np.prod((high - low)[:2]):
             remarks.append(
-                f"it has a ceiling {level - low[2]:.2f} m above its lowest corner, and no floor: one is put there"
+                f"it has a ceiling {level - low[2]:.2f} m above its lowest corner, and no floor: a floor is added"
             )
             parts.append(_floor(low, high))
         elif lacks:
@@ -302,7 +302,7 @@ def _floor(low: np.ndarray, high: np.ndarray) -> Part:
 
 
 def _write(path: Path, parts: list[Part], source: Path) -> None:
-    """The scene file and its folder of meshes, each renamed when whole."""
+    """Write the scene file and its folder of meshes, each renamed when whole."""
     folder = path.with_name(f"{path.stem}.meshes")
     if folder.exists() and any(item.suffix != ".ply" for item in folder.iterdir()):
         raise InputError(f"{folder}: holds other files than meshes of an import, expected another output name")
@@ -333,7 +333,7 @@ def _write(path: Path, parts: list[Part], source: Path) -> None:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """The name, numbered if something has it already, whatever the case of its letters."""
+    """Return a name, numbered if it is taken already, ignoring case."""
     number, unique = 1, name
     while unique.lower() in taken:
         number += 1

@@ -1,7 +1,7 @@
-"""Lidar logs as occupancy grids: CARMEN logs with corrected poses, and scans with their true poses.
+"""Lidar logs as occupancy grids: CARMEN logs with corrected poses, and scans with true poses.
 
 A CARMEN line ``FLASER n r1 ... rn x y theta ...`` holds n ranges over 180 degrees and the pose of the laser;
-``ROBOTLASER1 type start fov step max accuracy remission n r1 ... rn m ... x y theta ...`` says its own angles
+``ROBOTLASER1 type start fov step max accuracy remission n r1 ... rn m ... x y theta ...`` contains its own angles
 (CARMEN logger format, http://carmen.sourceforge.net/logger_playback.html). `NAME.scans.npz` holds ``ranges``,
 ``angle_min``, ``angle_increment`` and ``range_max``, the poses lie beside it in `NAME.truth.tum`.
 """
@@ -23,17 +23,17 @@ from radarize.io.tum import read_tum
 from radarsim.world.importers.occupancy import OccupancyGrid
 from radarsim.world.importers.part import unreported
 
-#: Readings beyond are no echo: SICK scanners say so with 32.767 or 81.83 m.
+#: Larger readings mean no echo: SICK scanners report 32.767 or 81.83 m then.
 USABLE = 30.0
-#: A cell is occupied if this share of the beams that came to it ended there. Walls seen at grazing incidence are
-#: passed by many beams through the same cell; people who walked past leave less.
+#: Fraction of the beams reaching a cell that must end there for it to be occupied. Walls at grazing incidence are
+#: passed by many beams in the same cell; people who walk past leave a smaller fraction.
 OCCUPIED = 0.3
-#: Free ground is seen at least this often.
+#: Smallest number of beams through a free cell.
 SEEN = 2
 _LARGEST = 20e6  # cells, of 8 bytes
-#: Bytes of a log, unpacked.
+#: Largest size of a log, unpacked, bytes.
 _BYTES = 256 << 20
-#: Of scans in an ``.npz``.
+#: Largest size of the scans in an ``.npz``, bytes.
 _FIELDS = ("ranges", "angle_min", "angle_increment", "range_max")
 
 
@@ -47,12 +47,12 @@ class Scan:
 
 
 def grid(path: Path, resolution: float, progress: Callable[..., object] = unreported) -> OccupancyGrid:
-    """Occupancy by counting the beams that ended in a cell and those that passed it.
+    """Count the beams that end in each cell and those that pass it, and derive occupancy.
 
     Args:
         path: ``.log``, ``.log.gz`` or ``.scans.npz``.
         resolution: side of a cell, m.
-        progress: called with a stage's name, scans done, scans in all.
+        progress: called with a stage's name, scans done, total scans.
 
     Raises:
         InputError: unreadable, a malformed line (with its number), or no scans.
@@ -86,7 +86,7 @@ def grid(path: Path, resolution: float, progress: Callable[..., object] = unrepo
 
 @njit(cache=True)
 def _cast(starts, ends, hits, passes):
-    """Count the cells along each beam (Amanatides and Woo 1987), its last cell as a hit."""
+    """Count the cells along each beam (Amanatides and Woo 1987), with the last cell as a hit."""
     for beam in range(len(starts)):
         x, y = starts[beam]
         dx, dy = ends[beam, 0] - x, ends[beam, 1] - y
@@ -145,7 +145,7 @@ def _front_laser(words: list[str]) -> Scan:
     values = np.array(words[2 : count + 5], float)
     if count < 2 or len(values) < count + 3:
         raise ValueError
-    # 180 degrees: 181 or 361 beams have one at each end, 180 have half a step to either side.
+    # 180 degrees: 181 or 361 beams include both ends, 180 beams are offset by half a step.
     step = np.pi / (count - count % 2)
     return Scan(tuple(values[count:]), values[:count], step * (np.arange(count) - (count - 1) / 2))
 

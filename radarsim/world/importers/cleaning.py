@@ -1,4 +1,4 @@
-"""Meshes as files have them, made fit for tracing: merged, without waste, small enough."""
+"""Cleaning of imported meshes for ray tracing: merged corners, no degenerate triangles, limited size."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,18 +10,18 @@ from radarize.io.errors import InputError
 from radarsim.world.importers.part import Part, unreported
 from radarsim.world.shapes import closest
 
-#: Corners closer than this are one, decimals of a metre.
+#: Decimals of a metre to which corners are rounded before merging.
 _DIGITS = 5
-#: Decimation may move 99 % of the surface by no more, m: a wall stays flat to a few wavelengths and where it was.
+#: Largest deviation of 99 % of the surface by decimation, m: a wall stays flat to a few wavelengths.
 DEVIATION = 0.02
 _SAMPLES = 200_000
 
 
 def clean(part: Part, source: str) -> Part | None:
-    """A part with corners merged, and without degenerate and repeated triangles; None if nothing is left.
+    """Merge corners of a part and remove degenerate and repeated triangles; None if nothing is left.
 
     Raises:
-        InputError: corners that are no numbers, or triangles of corners that do not exist.
+        InputError: corners that are not finite, or triangles of corners that do not exist.
     """
     vertices, faces = np.asarray(part.mesh.vertices, float), np.asarray(part.mesh.faces)
     used = np.zeros(len(vertices), bool)
@@ -37,13 +37,13 @@ def clean(part: Part, source: str) -> Part | None:
     mesh.update_faces(mesh.area_faces > 1e-12)
     if not len(mesh.faces):
         return None
-    mesh.update_faces(mesh.unique_faces())  # the same three corners, whichever way round, are one sheet
+    mesh.update_faces(mesh.unique_faces())  # the same three corners in either order are one sheet
     mesh.remove_unreferenced_vertices()
     return replace(part, mesh=mesh)
 
 
 def edges_of_many(mesh: trimesh.Trimesh) -> int:
-    """Number of edges with more than two triangles: there the mesh is no surface."""
+    """Number of edges with more than two triangles, where the mesh is no surface."""
     _, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
     return int(np.sum(count > 2))
 
@@ -51,12 +51,12 @@ def edges_of_many(mesh: trimesh.Trimesh) -> int:
 def decimate(
     parts: list[Part], budget: int, source: str, progress: Callable[..., object] = unreported
 ) -> tuple[list[Part], float]:
-    """Parts with no more than about `budget` triangles together, and the deviation of 99 % of the surface, m.
+    """Decimate parts to about `budget` triangles together; return them and the deviation of 99 % of the surface, m.
 
     Quadric error metrics (Garland and Heckbert 1997) collapse flat ground first, and so keep walls flat.
 
     Raises:
-        InputError: that would move the surface too far.
+        InputError: the deviation would be too large.
     """
     import open3d as o3d
 

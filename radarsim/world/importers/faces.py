@@ -1,9 +1,9 @@
-"""Straight wall faces in an occupancy grid: few, long, and square to one another where the building is.
+"""Straight wall faces in an occupancy grid: few, long, and orthogonal where the building is.
 
-Faces lie where occupied cells border on free ground. Border points with like directions are grown into straight pieces
-(as line segments are in pictures: von Gioi et al., LSD, IEEE TPAMI 32(4), 2010), pieces on one line are joined across
-gaps too narrow to walk through, and each face is turned to the building's main directions if that moves its ends by no
-more than about a cell. Faces that meet share their corner.
+Faces are borders between occupied cells and free ground. Border points with similar directions are grown into straight
+segments (as line segments in images: von Gioi et al., LSD, IEEE TPAMI 32(4), 2010), collinear segments are joined
+across gaps too narrow to walk through, and each face is aligned to the building's main directions if that moves its
+ends by no more than about a cell. Faces that meet share their corner.
 """
 
 from dataclasses import dataclass
@@ -16,23 +16,23 @@ from scipy.spatial import cKDTree
 
 from radarsim.world.importers.occupancy import OccupancyGrid
 
-#: Border points of a face are within this of its line, cells.
+#: Largest distance of a face's border points from its line, cells.
 OFFSET = 1.5
-#: Their directions are within this of the face's, cosine of 25 deg.
+#: Largest difference of their directions from the face's, cosine of 25 deg.
 ASKEW = np.cos(np.deg2rad(25))
-#: Faces on one line are one if the gap is narrower, m: no door is.
+#: Gap below which collinear faces are joined, m: no door is narrower.
 GAP = 0.4
-#: They are one across this gap if nothing free was seen in it, m: glass and dark things give no echo to a lidar.
+#: The same for a gap without observed free ground, m: glass and dark surfaces give no lidar echo.
 BLIND_GAP = 3.0
-#: Shorter pieces are no faces, m.
+#: Smallest length of a face, m.
 SHORTEST = 0.25
-#: A face is turned to a main direction if its ends move by no more, cells.
+#: Largest shift of a face's ends by alignment to a main direction, cells.
 SNAP = 1.5
-#: Ground that a disk of this radius does not reach is no room: rays through a window, the gap behind a cupboard, m.
+#: Radius of the disk that must fit into rooms, m; excludes rays through a window and gaps behind cupboards.
 _DISK = 0.2
-#: Smaller rooms are left out, m^2.
+#: Smallest area of a room, m^2.
 _ROOM = 1.0
-#: Faces that end this close to where their lines cross have a corner there, m.
+#: Distance from the crossing of their lines within which faces end in a common corner, m.
 _CORNER = 0.35
 
 
@@ -44,7 +44,7 @@ class Face:
         center: a point on it, m along the grid's sides.
         angle: of its direction, rad; free ground is to the left.
         low, high: where it starts and ends along its direction, m from `center`.
-        points: (n, 2) border points that it stands for.
+        points: (n, 2) border points of the face.
     """
 
     center: Float[np.ndarray, "2"]
@@ -65,7 +65,7 @@ class Face:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Length of the face, m."""
         return self.high - self.low
 
     @property
@@ -75,7 +75,7 @@ class Face:
 
     @classmethod
     def through(cls, points: Float[np.ndarray, "n 2"], normal: Float[np.ndarray, "2"]) -> "Face":
-        """The least-squares line through points, free ground on the side of `normal`."""
+        """Fit the least-squares line through points, with free ground on the side of `normal`."""
         center = points.mean(axis=0)
         across = np.linalg.eigh(np.cov((points - center).T))[1][:, 0]
         across = across if across @ normal > 0 else -across
@@ -84,7 +84,7 @@ class Face:
 
 
 def rooms(grid: OccupancyGrid) -> Bool[np.ndarray, "x y"]:
-    """Free ground that belongs to rooms: what a disk can reach, without the rays seen through windows."""
+    """Free ground that belongs to rooms: reachable by a disk, without rays seen through windows."""
     cells = _DISK / grid.resolution
     solid = ndimage.binary_closing(np.pad(grid.free, 1), np.ones((2, 2)))[1:-1, 1:-1] & ~grid.occupied
     inner = ndimage.distance_transform_edt(np.pad(solid, 1))[1:-1, 1:-1] > cells
@@ -114,8 +114,10 @@ def faces(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Face]:
 def _border(
     grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
-    """Points about a cell apart on the border of free ground where something is, and unit normals into the free."""
-    # Thickened by a cell so that smoothing does not wash thin walls out; the border is moved back afterwards.
+    """Points about a cell apart on the border of free ground to occupied cells, and unit normals towards free
+    ground."""
+    # Occupied cells are dilated by one so that smoothing does not remove thin walls; the border is moved back
+    # afterwards.
     near = ndimage.distance_transform_edt(~grid.occupied)
     field = ndimage.gaussian_filter((inside & (near > 1.0)).astype(float), 1.2)
     lines = contourpy.contour_generator(z=field.T).lines(0.5)
@@ -132,7 +134,7 @@ def _border(
 def _grown(
     points: Float[np.ndarray, "n 2"], normals: Float[np.ndarray, "n 2"], cell: float
 ) -> list[Int[np.ndarray, "m"]]:
-    """Groups of neighbouring points near one line, by their numbers; each point in one group."""
+    """Groups of neighbouring points near one line, by index; each point is in one group."""
     around = cKDTree(points).query_ball_point(points, 3 * cell)
     coherence = np.array([np.linalg.norm(normals[near].mean(axis=0)) for near in around])
     taken, groups = np.zeros(len(points), bool), []
@@ -163,7 +165,7 @@ def _grown(
 
 
 def _joined(found: list[Face], grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Face]:
-    """Faces on one line made one, longest first."""
+    """Join collinear faces, longest first."""
     pending = sorted(found, key=lambda face: -face.length)
     done: list[Face] = []
     while pending:
@@ -196,12 +198,12 @@ def _on_one_line(face: Face, other: Face, grid: OccupancyGrid, inside: Bool[np.n
 
 
 def _square(found: list[Face], offset: float) -> None:
-    """Turn faces to the building's main directions, in place, and faces nearly on one level onto it."""
+    """Align faces to the building's main directions, in place, and nearly coplanar faces to a common line."""
     if not found:
         return
     lengths = np.array([face.length for face in found])
     angles = np.array([face.angle for face in found])
-    # The mode of the angles modulo 90 deg, by length: the circular mean around the fullest degree.
+    # The mode of the angles modulo 90 deg, weighted by length: the circular mean around the largest bin.
     quarter = np.pi / 2
     share = np.bincount((angles % quarter / quarter * 90).astype(int) % 90, lengths, 90)
     share = ndimage.gaussian_filter1d(share, 1.0, mode="wrap")
@@ -219,7 +221,7 @@ def _square(found: list[Face], offset: float) -> None:
 
 
 def _meet(found: list[Face]) -> None:
-    """Let faces that nearly meet end where their lines cross, in place."""
+    """Extend faces that nearly meet to the crossing of their lines, in place."""
     ends = np.array([face.ends for face in found]).reshape(-1, 2)
     for number, face in enumerate(found):
         apart = np.linalg.norm(ends[:, None] - face.ends, axis=2).min(axis=1)
@@ -242,7 +244,7 @@ def _meet(found: list[Face]) -> None:
 
 
 def _crossing(face: Face, other: Face) -> tuple[float, float] | None:
-    """Where along `face` the line of `other` crosses, and how far that is beyond the other's ends, m."""
+    """Position along `face` where the line of `other` crosses, and its distance beyond the other's ends, m."""
     sine = face.direction @ other.normal
     if abs(sine) < np.sin(np.deg2rad(6)):
         return None

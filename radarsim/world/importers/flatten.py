@@ -1,8 +1,8 @@
-"""Planes of noisy scans: walls that a scanner saw a few millimetres rough are made flat again.
+"""Removal of scanner noise from planes: scanned walls become flat again.
 
-A radar at 77 GHz sees a wall as a mirror; the same wall with 5 mm of scanner noise would sparkle like gravel (the
-residual is the scanner's, true roughness is the material's: `scene.planes`). That module finds planes up to half a
-millimetre of noise. Here they are found on a smoothed copy, and the corners of the scan near a plane are put onto it.
+A radar at 77 GHz sees a wall as a mirror; the same wall with 5 mm of scanner noise would scatter like gravel (the
+residual is the scanner's, true roughness is the material's: `scene.planes`). That module finds planes with up to half a
+millimetre of noise. Here they are found on a smoothed copy, and the corners of the scan near a plane are moved onto it.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from scipy import sparse
 
 from radarsim.world.planes import regions
 
-#: Only meshes as fine as scans are looked at: median edge, m, and number of triangles.
+#: Scans are recognised by their resolution: largest median edge, m, and smallest number of triangles.
 FINE, MANY = 0.12, 2000
-#: The copy is smoothed over about this length, m: wider than noise, narrower than furniture.
+#: Smoothing length of the copy, m: larger than noise, smaller than furniture.
 _LENGTH = 0.10
 _STEPS = (8, 60)
-#: Smaller planes are left as they are, m^2.
+#: Smallest area of planes that are flattened, m^2.
 SMALLEST = 0.25
-#: Corners within four times the noise of a plane are put onto it, but none further away, m.
+#: Corners within four times the noise of a plane are moved onto it, but by no more than this, m.
 FARTHEST = 0.04
 
 
@@ -36,7 +36,7 @@ class Flattened:
 
 
 def flatten(mesh: trimesh.Trimesh) -> Flattened | None:
-    """The mesh with its planes flat; None if it is no scan, or has no planes, or none that are noisy."""
+    """Flatten the planes of a mesh; None if it is no scan, or has no noisy planes."""
     edge = float(np.median(mesh.edges_unique_length))
     if len(mesh.faces) < MANY or edge > FINE:
         return None
@@ -58,7 +58,7 @@ def flatten(mesh: trimesh.Trimesh) -> Flattened | None:
     if noise < 1e-4:
         return None
     reach = min(4 * noise, FARTHEST)
-    # Smoothing rounds the rims off, so a plane goes on beyond its region as long as the scan stays near it.
+    # Smoothing rounds the rims off, so a plane extends beyond its region as long as the scan stays near it.
     members = [
         _spread(corners, np.abs((vertices - at) @ normal) < reach, links, 2 + int(np.sqrt(4 * steps)))
         for corners, (at, normal) in zip(inner, planes, strict=True)
@@ -80,7 +80,7 @@ def _fit(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "3"], Floa
 
 
 def _spread(corners: np.ndarray, near: np.ndarray, links: sparse.coo_matrix, steps: int) -> np.ndarray:
-    """The corners near a plane that can be reached from some of its own in so many steps."""
+    """Corners near a plane that are connected to some of its own by at most `steps` edges."""
     reached = np.zeros(len(near), bool)
     reached[corners] = near[corners]
     edge, links = np.flatnonzero(reached), links.tocsr()

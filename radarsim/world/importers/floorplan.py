@@ -1,4 +1,4 @@
-"""From an occupancy grid to a building: walls, what stands about, floor and ceiling."""
+"""Building from an occupancy grid: walls, free-standing objects, floor and ceiling."""
 
 from collections.abc import Callable
 
@@ -16,11 +16,11 @@ from radarsim.world.importers.occupancy import OccupancyGrid
 from radarsim.world.importers.part import Part, unreported
 from radarsim.world.planes import trapezoids
 
-#: Things that are no walls (chair legs, boxes, people who stood still) are this high, m.
+#: Height of occupied cells that are no walls (chairs, boxes, people who stood still), m.
 CLUTTER = 1.0
-#: Fewer occupied cells together are noise.
+#: Smallest number of connected occupied cells that are not noise.
 _SPECK = 4
-#: Floor and ceiling are drawn in squares of this size, m: few rectangles rather than an exact edge, which walls hide.
+#: Size of the squares of floor and ceiling, m: few rectangles instead of an exact edge, which walls hide.
 _TILE = 0.5
 #: Narrower gaps between walls are closed, m.
 _SLIT = 0.2
@@ -31,14 +31,14 @@ _COURT = 1.0
 def parts(
     grid: OccupancyGrid, height: float, thickness: float, source: str, progress: Callable[..., object] = unreported
 ) -> list[Part]:
-    """The parts of a building with the plan of a grid: ``walls``, ``clutter``, ``floor`` and ``ceiling``.
+    """Parts of a building from a grid: ``walls``, ``clutter``, ``floor`` and ``ceiling``.
 
     Args:
-        grid: what is occupied and what is free.
+        grid: occupied and free cells.
         height: floor to ceiling, m.
         thickness: of the thinnest wall, m.
         source: for messages.
-        progress: called with a stage's name, steps done, steps in all.
+        progress: called with a stage's name, steps done, total steps.
 
     Raises:
         InputError: no free ground, or nothing occupied around it.
@@ -68,7 +68,7 @@ def parts(
 def walls(
     found: list[Face], thickness: float, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]
 ) -> shapely.Geometry:
-    """The area that walls cover: behind each face, as deep as `thickness` or to the middle of a thinner wall."""
+    """Area of walls: behind each face, with depth `thickness` or up to the middle of a thinner wall."""
     bodies = []
     for number, face in enumerate(found):
         behind = _depth(face, thickness, grid, inside)
@@ -79,7 +79,7 @@ def walls(
         corners = [(low, front), (high, front), (high, front - thickness), (low, front - thickness)]
         bodies.append(Polygon([face.center + a * along + b * across for a, b in corners]))
     union = shapely.union_all(shapely.set_precision(bodies, 1e-4))
-    # Slits are where lines do not quite meet, or between the two faces of a thick wall; so are small courts.
+    # Slits remain where lines do not quite meet, and between the two faces of a thick wall; so do small courts.
     closed = union.buffer(_SLIT / 2, join_style="mitre", mitre_limit=2)
     closed = closed.buffer(-_SLIT / 2 - 0.02, join_style="mitre", mitre_limit=2)
     closed = shapely.simplify(closed.buffer(0.02, join_style="mitre", mitre_limit=2), 0.01)
@@ -91,7 +91,7 @@ def _without_courts(part: Polygon) -> Polygon:
 
 
 def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> float:
-    """How far behind a face free ground begins again, m, at most `thickness`."""
+    """Distance behind a face at which free ground begins again, m, at most `thickness`."""
     steps = np.arange(1.0, np.ceil(thickness / grid.resolution) + 2)
     along = np.linspace(face.low, face.high, max(3, int(face.length / grid.resolution)))
     at = face.center + along[:, None, None] * face.direction - steps[:, None] * grid.resolution * face.normal
@@ -100,7 +100,7 @@ def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside: Bool[np.nd
 
 
 def _overlap(face: Face, end: float, sign: int, found: list[Face], number: int, thickness: float) -> float:
-    """How far a wall's body runs on beyond the end of its face, m: into the wall that it meets there."""
+    """Extension of a wall's body beyond the end of its face, m: into the wall that it meets there."""
     corner = face.center + end * face.direction
     for other, mate in enumerate(found):
         if other == number:
@@ -113,7 +113,7 @@ def _overlap(face: Face, end: float, sign: int, found: list[Face], number: int, 
 
 
 def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid: shapely.Geometry) -> list[Polygon]:
-    """Outlines of what stands on free ground apart from the walls."""
+    """Outlines of free-standing objects: occupied cells apart from the walls."""
     cell = grid.resolution
     taken = solid.buffer(1.5 * cell)
     shapely.prepare(taken)
@@ -136,7 +136,7 @@ def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid: shapely
 
 
 def upright(area: shapely.Geometry, height: float, lid: bool = False) -> trimesh.Trimesh:
-    """The upright sides of an area from the floor to `height` (m), seen from outside; its top too if `lid`."""
+    """Vertical sides of an area from the floor to `height` (m), seen from outside; with its top if `lid`."""
     whole = shapes.joined(*(trimesh.creation.extrude_polygon(part, height) for part in shapely.get_parts(area)))
     whole.update_faces((whole.face_normals[:, 2] > -0.5) & (lid | (whole.face_normals[:, 2] < 0.5)))
     return whole
@@ -147,7 +147,7 @@ def _placed(area: shapely.Geometry, grid: OccupancyGrid) -> shapely.Geometry:
 
 
 def _tiles(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Polygon]:
-    """Few rectangles that cover the free ground and a little of what bounds it."""
+    """Cover the free ground and a margin by few rectangles."""
     size = max(1, round(_TILE / grid.resolution))
     around = np.pad(inside, [(0, -n % size) for n in inside.shape])
     coarse = around.reshape(around.shape[0] // size, size, around.shape[1] // size, size).any(axis=(1, 3))

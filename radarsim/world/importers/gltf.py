@@ -1,4 +1,4 @@
-"""What a glTF file declares, before a library takes it at its word (glTF 2.0 specification, sections 3.5.2 and 3.6)."""
+"""Checks of a glTF file's declarations before it is loaded (glTF 2.0 specification, sections 3.5.2 and 3.6)."""
 
 import struct
 from pathlib import Path
@@ -7,18 +7,18 @@ from radarize.io.errors import explained
 from radarize.io.files import read_bytes
 from radarize.io.jsonfile import parse_json
 
-#: Bytes of a file, and corners that all places of its meshes have together.
+#: Largest size of a file, bytes, and largest number of corners of all instances of its meshes.
 _BYTES, _CORNERS = 512 << 20, 15_000_000
-#: Bytes of a component, and components of an entry.
+#: Bytes per component, and components per entry.
 _COMPONENTS = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _ENTRIES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
 def check(path: Path) -> None:
-    """Refuse a file whose nodes are no trees, whose arrays reach beyond their bytes, or that makes far more of itself.
+    """Reject a file whose nodes are no trees, whose arrays exceed their buffers, or that expands to too many corners.
 
     Raises:
-        InputError: it does, or is no such file.
+        InputError: the file is rejected, or is no such file.
     """
     content = read_bytes(path, "a glTF file", _BYTES)
     with explained(f"{path}: is not a readable glTF file"):
@@ -37,7 +37,7 @@ def check(path: Path) -> None:
 
 
 def _trees(nodes: list[dict]) -> None:
-    """Whether every node has one parent at most, and a root above it."""
+    """Check that every node has at most one parent, and a root above it."""
     children = [child for node in nodes for child in node.get("children", ())]
     if len(set(children)) < len(children) or not set(children) <= set(range(len(nodes))):
         raise ValueError("a node is the child of several, expected trees of nodes")
@@ -50,7 +50,7 @@ def _trees(nodes: list[dict]) -> None:
 
 
 def _within(tree: dict, number: int, accessor: dict) -> None:
-    """Whether an accessor's entries lie in its view, and that in its buffer."""
+    """Check that an accessor's entries lie in its view, and the view in its buffer."""
     size = _COMPONENTS[accessor["componentType"]] * _ENTRIES[accessor["type"]]
     count, start = accessor["count"], accessor.get("byteOffset", 0)
     if "bufferView" in accessor:

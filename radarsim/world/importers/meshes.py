@@ -1,4 +1,4 @@
-"""Mesh files: glTF, OBJ, PLY and STL, each read as parts of one material.
+"""Import of mesh files: glTF, OBJ, PLY and STL, each read as parts of one material.
 
 Parts are a glTF file's nodes, an OBJ file's objects, groups and materials, and the objects or categories that a PLY
 file gives its faces (``object_id``, ``category``, ``label``; Replica's `mesh_semantic.ply` has its class names in
@@ -19,7 +19,7 @@ from radarsim.world.importers import gltf
 from radarsim.world.importers.part import Part
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
-#: Names that PLY files use for what a face belongs to.
+#: Properties with which PLY files assign faces to objects or categories.
 _CATEGORIES = ("category", "category_id", "class", "class_id", "label", "semantic", "object_id", "objectId")
 
 
@@ -46,7 +46,7 @@ def parts(path: Path) -> list[Part]:
         )
     except Exception as error:  # trimesh's readers raise whatever their parsers do
         raise InputError(f"{path}: is not a readable {path.suffix[1:]} file ({_reason(error)})") from error
-    with explained(f"{path}: is not a readable {path.suffix[1:]} file"):  # of points with two coordinates, say
+    with explained(f"{path}: is not a readable {path.suffix[1:]} file"):  # such as one of 2-D points
         found = _parts(scene, path)
     if not found:
         raise InputError(f"{path}: holds no triangles")
@@ -78,7 +78,7 @@ def _reason(error: Exception) -> str:
 
 
 def _require_materials(path: Path) -> None:
-    """An OBJ file's material names come from its .mtl file: without it all parts would look alike."""
+    """Check that the .mtl file with an OBJ file's material names exists: without it all parts would be the same."""
     with path.open("rb") as file:
         words = [line.split(maxsplit=1) for line in file if line.startswith((b"mtllib", b"usemtl"))]
     if not any(word[0] == b"usemtl" for word in words):
@@ -91,14 +91,14 @@ def _require_materials(path: Path) -> None:
 
 
 def _by_category(path: Path, mesh: trimesh.Trimesh, placed: trimesh.Trimesh) -> list[Part]:
-    """Parts of a PLY file whose faces carry a category; none if they do not."""
+    """Parts of a PLY file whose faces have a category; none if they do not."""
     data = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")
     names = data.dtype.names if isinstance(data, np.ndarray) else data
     key = next((key for key in _CATEGORIES if names is not None and key in names), None)
     if key is None:
         return []
     of = np.ravel(data[key]).astype(np.int64)
-    if len(placed.faces) == 2 * len(of):  # quads, cut in two: all first halves, then all second ones
+    if len(placed.faces) == 2 * len(of):  # quads, split: all first halves, then all second ones
         of = np.concatenate([of, of])
     if len(of) != len(placed.faces):
         raise InputError(f"{path}: has {len(of)} values of {key} for {len(placed.faces)} triangles, expected one each")

@@ -1,7 +1,7 @@
-"""Mitsuba and Sionna RT scenes (.xml): shapes, their transforms, and what their BSDFs are called.
+"""Import of Mitsuba and Sionna RT scenes (.xml): shapes, their transforms, and the names of their BSDFs.
 
-Read as text, never by running the scene's plugins. Documents with entities are refused, which could grow without bound
-or read other files. https://mitsuba.readthedocs.io/en/stable/src/key_topics/scene_format.html
+The file is parsed as text, without running the scene's plugins. Documents with entities, which could expand without
+limit or read other files, are refused. https://mitsuba.readthedocs.io/en/stable/src/key_topics/scene_format.html
 """
 
 from pathlib import Path
@@ -26,7 +26,7 @@ def parts(path: Path) -> list[Part]:
     """Shapes of a scene in world coordinates.
 
     Raises:
-        InputError: no XML, entities, a shape that cannot be read (with its name), a missing mesh.
+        InputError: invalid XML, entities, a shape that cannot be read (with its name), a missing mesh.
     """
     root = _parse(path)
     defaults = {item.get("name", ""): item.get("value", "") for item in root.iter("default")}
@@ -104,7 +104,7 @@ def _mesh(shape: ElementTree.Element, folder: Path) -> trimesh.Trimesh:
 
 
 def _vector(item: ElementTree.Element, default: float = 0.0) -> Float[np.ndarray, "3"]:
-    """A vector as x, y, z or as one value for all three, or as three of them."""
+    """Parse a vector given as x, y, z or as one value for all three, or as three of them."""
     if (text := item.get("value")) is not None:
         numbers = np.array(text.replace(",", " ").split(), float)
         if len(numbers) not in (1, 3):
@@ -114,7 +114,7 @@ def _vector(item: ElementTree.Element, default: float = 0.0) -> Float[np.ndarray
 
 
 def _transform(item: ElementTree.Element | None) -> Float[np.ndarray, "4 4"]:
-    """The steps of a transform, each after the one before."""
+    """Multiply the steps of a transform, in their order."""
     matrix = np.eye(4)
     for step in item if item is not None else ():
         if step.tag == "translate":
@@ -138,7 +138,7 @@ def _transform(item: ElementTree.Element | None) -> Float[np.ndarray, "4 4"]:
 
 
 def _material(shape: ElementTree.Element, bsdfs: dict) -> tuple[Choice | None, tuple[str, ...]]:
-    """What a shape is made of, and what its BSDFs are called."""
+    """Material of a shape, and the names of its BSDFs."""
     refs = [bsdfs[ref.get("id")] for ref in shape.findall("ref") if ref.get("id") in bsdfs]
     labels = [label for ref in shape.findall("ref") if (label := ref.get("id"))]
     for bsdf in [*refs, *shape.findall("bsdf")]:

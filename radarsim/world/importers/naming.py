@@ -1,4 +1,4 @@
-"""Which material an imported part gets: by the user's patterns, by what the source says, by the words of its name."""
+"""Material of an imported part: by the user's patterns, by the source's material, or by the words of its name."""
 
 import re
 from fnmatch import fnmatchcase
@@ -18,7 +18,7 @@ _MEANING |= {name: name for name in MATERIALS if " " not in name}
 
 
 class MaterialMap:
-    """Patterns and their materials, the first that fits decides.
+    """Patterns and their materials; the first match applies.
 
     The file is YAML, ``pattern: material``, a material being a name or ``{custom: {...}}`` as in scene files; patterns
     (``*``, ``?``, ``[...]``, case ignored) are tried on a part's name, material, group and category.
@@ -33,7 +33,7 @@ class MaterialMap:
 
         Args:
             path: none: no patterns.
-            default: material of parts whose names say nothing; none: plasterboard, and concrete of whole rooms.
+            default: material of parts without a known name; None: plasterboard, and concrete for whole rooms.
 
         Raises:
             InputError: unreadable, malformed, or an unknown material, with the pattern.
@@ -51,14 +51,14 @@ class MaterialMap:
         return cls({str(pattern): choice for pattern, choice in data.items()}, default)
 
     def choose(self, part: Part) -> tuple[Choice, str]:
-        """The material of a part, and by what it was chosen."""
+        """Material of a part, and the reason for the choice."""
         names = [name.lower() for name in (part.name, *part.labels)]
         for pattern, choice in self.patterns.items():
             if any(fnmatchcase(name, pattern.lower()) for name in names):
                 return choice, f"pattern {pattern}"
         if part.material is not None:
             return part.material, "source"
-        # A material's name tells more than an object's.
+        # A material's name has priority over an object's.
         for name in (*part.labels, part.name):
             if guess := meaning(name):
                 return guess, "name" if name == part.name else f"label {name}"
@@ -66,11 +66,11 @@ class MaterialMap:
 
 
 def meaning(name: str) -> str | None:
-    """The material that the words of a name stand for: one of the registry's (``mat-itu_glass``), or a thing's."""
+    """Material that the words of a name stand for: a material (``mat-itu_glass``), or that of a kind of object."""
     words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
     plain = " ".join(word for word in words if word not in ("itu", "mat", "material"))
     for known in sorted(MATERIALS, key=len, reverse=True):
         if f" {known} " in f" {plain} ":
             return known
-    # The last word is the thing itself: a "wall cabinet" is a cabinet.
+    # The last word is the object itself: a "wall cabinet" is a cabinet.
     return next((_MEANING[word] for word in reversed(words) if word in _MEANING), None)

@@ -1,4 +1,4 @@
-"""An occupancy grid: what a ROS map is and what a lidar log becomes."""
+"""Occupancy grid from a ROS map or a lidar log."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 @dataclass(frozen=True)
 class OccupancyGrid:
-    """Cells that are occupied, free, or neither: unknown.
+    """Grid of cells that are occupied, free, or neither (unknown).
 
     Attributes:
         occupied, free: (ix, iy).
@@ -22,7 +22,7 @@ class OccupancyGrid:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def to_world(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
-        """Points in metres along the grid's sides, in the world."""
+        """Transform points in metres along the grid's sides to the world."""
         x, y, yaw = self.origin
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         return np.asarray(points, float) @ turn.T + [x, y]

@@ -1,4 +1,4 @@
-"""A piece of an imported scene that gets one material."""
+"""Part of an imported scene with one material."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ import trimesh
 
 @dataclass
 class Part:
-    """Triangles that have one material.
+    """Triangles of one material.
 
     Attributes:
-        name: what the source calls it.
-        mesh: in the source's own coordinates until `importers` places it.
+        name: name in the source.
+        mesh: in the source's coordinates until `importers` transforms it.
         material: a name of `radarsim.world.materials` or the mapping of a custom one, as scene files have it; None:
-            the source does not say.
+            the source has no material.
         solid: part of the surface of a body: seen from its outside only.
-        room: a closed surface around all else, seen from its inside.
-        labels: other names that material patterns may match: those of its material, group or category.
+        room: a closed surface around everything else, seen from its inside.
+        labels: other names for material patterns: those of its material, group or category.
     """
 
     name: str
@@ -28,4 +28,4 @@ class Part:
 
 
 def unreported(*_: object) -> None:
-    """Progress that nobody wants to see."""
+    """Ignore progress."""

@@ -1,4 +1,4 @@
-"""ROS maps: a picture (.pgm, .png) and the .yaml that says what it means (map_server's format).
+"""Import of ROS maps: an image (.pgm, .png) and a .yaml with its metadata (map_server's format).
 
 A pixel is occupied with probability p = (255 - value) / 255, or value / 255 if `negate`; above ``occupied_thresh`` it
 counts as occupied, below ``free_thresh`` as free, between them as unknown. In mode ``raw`` the value is the occupancy
@@ -16,13 +16,13 @@ from radarize.io.yamlfile import read_yaml
 from radarize.pipeline.runfolder.occupancy import MapFile
 from radarsim.world.importers.occupancy import OccupancyGrid
 
-#: That map_server reads and writes, as Pillow calls them.
+#: Image modes that map_server reads and writes, by Pillow's names.
 _FORMATS = ("PPM", "PNG", "BMP")
 _FARTHEST = 500.0  # m, of a building
 
 
 def is_map(path: Path) -> bool:
-    """Whether a .yaml file is a map's rather than anything else."""
+    """Whether a .yaml file is a map."""
     try:
         data = read_yaml(path)
     except InputError:
@@ -31,7 +31,7 @@ def is_map(path: Path) -> bool:
 
 
 def grid(path: Path) -> OccupancyGrid:
-    """The map of a .yaml file, or of the .yaml beside a picture.
+    """Read the map of a .yaml file, or of the .yaml beside an image.
 
     Raises:
         InputError: a file is missing or unreadable, or a key is, with its value.

@@ -1,7 +1,7 @@
-"""Rooms told from solids: a closed surface that holds all else and has space to stand in is seen from its inside.
+"""Detection of rooms among closed surfaces: one that encloses everything else and has space to stand in.
 
-Files say little of it: a modelled room is as often a box with its faces outwards as one with its faces inwards. Only
-outwards it would be a block of concrete, and a walk in it would see nothing.
+Files do not mark them: the faces of a modelled room point outwards as often as inwards. With outward faces it would be
+a solid block, and a radar in it would see nothing.
 """
 
 from collections.abc import Iterator
@@ -13,15 +13,15 @@ from jaxtyping import Int
 
 from radarsim.world.importers.part import Part
 
-#: A room is so high, m, and so wide on average, twice its volume over its surface, m: a closed mesh of walls alone
-#: holds all else, too, but is as wide as the walls are thick.
+#: Smallest height of a room, m, and smallest mean width, twice its volume over its surface, m: a closed mesh of walls
+#: alone encloses everything, too, but is only as wide as the walls are thick.
 _HIGH, _WIDE = 1.8, 0.6
-#: What lies further outside than this, m, is reason to be outside.
+#: Tolerance of the enclosure, m.
 _BEYOND = 0.3
 
 
 def turned_to_rooms(parts: list[Part]) -> tuple[list[Part], list[str]]:
-    """Parts with the faces of rooms inwards, floors up; and the names of those that were turned.
+    """Turn the faces of rooms inwards, with floors up; return the parts and the names of those that were turned.
 
     Args:
         parts: clean, z up, m.
@@ -43,7 +43,7 @@ def turned_to_rooms(parts: list[Part]) -> tuple[list[Part], list[str]]:
 
 
 def _shells(mesh: trimesh.Trimesh) -> Iterator[tuple[Int[np.ndarray, "face"], trimesh.Trimesh]]:
-    """The closed surfaces of a mesh with space to stand in: their faces, and each by itself."""
+    """Closed surfaces of a mesh with space to stand in: their faces, and each as a mesh."""
     for faces in trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=4):
         shell = trimesh.Trimesh(mesh.vertices, mesh.faces[faces], process=False)
         if np.ptp(shell.bounds[:, 2]) >= _HIGH and shell.is_watertight and 2 * abs(shell.volume) > _WIDE * shell.area:

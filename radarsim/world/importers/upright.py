@@ -1,21 +1,22 @@
-"""Which axis of a mesh points up, from the mesh itself: formats say it, and files do otherwise."""
+"""Estimate of a mesh's up axis from its geometry, because files do not always follow their format."""
 
 import numpy as np
 
 from radarsim.world.importers.part import Part
 
-#: Faces within this share of a mesh's extent from its end are that end, and cover it from this share of its area on.
+#: Faces within this fraction of a mesh's extent from its end belong to that end, and cover it from this fraction of
+#: area.
 _END, _COVERS = 0.1, 0.5
-#: Lengths that differ by less than this factor say nothing.
+#: Lengths that differ by less than this factor are not conclusive.
 _CLEAR = 1.2
 
 
 def up_axis(parts: list[Part], usual: str) -> tuple[str, str]:
-    """``y`` or ``z``, and why: a place has a floor, perhaps no ceiling, and is less high than wide.
+    """``y`` or ``z``, and the reason: a place has a floor, perhaps no ceiling, and is less high than wide.
 
     Args:
         parts: in the file's own axes.
-        usual: what the format has, where the mesh leaves it open.
+        usual: axis of the format, used if the mesh is not conclusive.
     """
     corners = np.concatenate([part.mesh.triangles.reshape(-1, 3) for part in parts])
     normal = np.concatenate([part.mesh.face_normals for part in parts])

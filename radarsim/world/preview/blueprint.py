@@ -1,4 +1,4 @@
-"""A scene's plan as an architect draws it: cut at breast height, walls filled, furniture light below."""
+"""Floor plan of a scene as a drawing: cut at breast height, walls filled, furniture light below."""
 
 from typing import TYPE_CHECKING
 
@@ -11,9 +11,9 @@ from radarsim.world.scene import Scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Height of the cut, m: above sills, through windows and doors. What lies below is seen from above.
+#: Height of the cut, m: above sills, through windows and doors. Objects below are seen from above.
 CUT = 1.25
-#: What reaches this share of the scene's height is part of the building.
+#: Fraction of the scene's height from which an object is part of the building.
 _WALL = 0.9
 _OUTLINES = (0.1, 0.3, 0.6, 0.735, 1.1)  # m, where furniture is outlined
 
@@ -33,7 +33,7 @@ def blueprint(scene: Scene) -> "Figure":
     colors = np.array([o.material.color for o in scene.objects])
     height = min(low[2] + CUT, (low[2] + high[2]) / 2)
 
-    # Floors, and on them what lies below the cut, from below upwards.
+    # Floors, and on them the objects below the cut, from the lowest upwards.
     up = (scene.normals[:, 2] > 0.5) & (scene.triangles[:, :, 2].max(axis=1) < height)
     order = np.flatnonzero(up)[np.argsort(scene.triangles[up][:, :, 2].mean(axis=1), kind="stable")]
     on_floor = scene.triangles[order][:, :, 2].max(axis=1) < low[2] + 0.02
@@ -52,8 +52,8 @@ def blueprint(scene: Scene) -> "Figure":
 
     cut = Section.of(scene, height)
     for area, owner in cut.areas(scene):
-        # The cut is black, as is the custom; the faces of walls show what they are made of.
-        # The reveals of an opening are lower than the wall that they bound.
+        # The cut is black, as usual; the faces of walls have the colours of their materials. The reveals of an opening
+        # are lower than the wall that they bound.
         face = "0.2" if wall[owner] or area.area > 1.0 else colors[owner]
         for ring in _filled(area):
             axes.fill(*ring.T, facecolor=face, edgecolor="none", zorder=3)

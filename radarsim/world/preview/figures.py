@@ -1,4 +1,4 @@
-"""Pictures of a scene: an architect's plan, and a rendering with the ceilings taken off."""
+"""Pictures of a scene: a floor plan, and a rendering without the ceilings."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def preview(scene: Scene, folder: str | Path, width: int = 1100, samples: int = 
 
     Args:
         scene: the world.
-        folder: is made where it is missing.
+        folder: created if it does not exist.
         width, samples: of the rendering, pixels and paths per pixel.
 
     Raises:

@@ -1,4 +1,4 @@
-"""A perspective picture of a scene by Sionna RT's path tracer: the building cut open below its ceilings."""
+"""Perspective rendering of a scene by Sionna RT's path tracer: the building cut open below its ceilings."""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,15 +10,15 @@ from radarsim.world.objects import SceneObject
 from radarsim.world.preview.section import Section
 from radarsim.world.scene import Scene
 
-#: Where the building is cut, m below its top: under lamps and ceilings, above doors.
+#: Cut below the building's top, m: under lamps and ceilings, above doors.
 BELOW_TOP = 0.45
 _AHEAD = np.array([0.30, 0.60, -0.80])
-#: Of walls cut through.
+#: Colour of walls cut through.
 CAP = Material("cut", None, 0.0, 0.0, color=(0.16, 0.16, 0.17))
 
 
 def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarray, "h w 3"]:
-    """The scene from above, sRGB in 0...1.
+    """Render the scene from above, sRGB in 0...1.
 
     Args:
         scene: the world.
@@ -30,7 +30,7 @@ def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarr
     """
     opened = Scene(scene.name, cut_open(scene))
     eye, target, tangent, height = _camera(opened.triangles.reshape(-1, 3), width)
-    world = opened.sionna  # before Sionna RT is loaded: it looks at the machine's LLVM
+    world = opened.sionna  # before Sionna RT is loaded: this selects the LLVM
     import sionna.rt as rt
 
     image = np.array(
@@ -45,7 +45,7 @@ def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarr
 
 
 def cut_open(scene: Scene) -> list[SceneObject]:
-    """What lies below the cut, by material, and caps on the walls."""
+    """Objects below the cut, by material, and caps on the walls."""
     low, high = scene.bounds[:, 2]
     level = high - BELOW_TOP if high - low > 2.2 else high + 0.01
     triangles: dict[Material, list[np.ndarray]] = {}
@@ -61,7 +61,7 @@ def cut_open(scene: Scene) -> list[SceneObject]:
 def _camera(
     corners: Float[np.ndarray, "n 3"], width: int
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], float, int]:
-    """Eye, target, tangent of half the angle of view across and picture height that just show all corners."""
+    """Eye, target, tangent of half the field of view across and picture height that just contain all corners."""
     ahead = _AHEAD / np.linalg.norm(_AHEAD)
     low, high = corners.min(axis=0), corners.max(axis=0)
     target, reach = (low + high) / 2, np.linalg.norm(high - low)

@@ -1,4 +1,4 @@
-"""Horizontal sections of a scene: what a plane cuts, as lines, and the areas inside of bodies."""
+"""Horizontal sections of a scene: intersection lines, and the areas inside of bodies."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from radarsim.world.scene import Scene
 
 @dataclass(frozen=True)
 class Section:
-    """What a plane of constant height cuts.
+    """Intersection of a scene with a plane of constant height.
 
     Attributes:
         lines: ends of the segments, m.
@@ -26,7 +26,7 @@ class Section:
 
     @classmethod
     def of(cls, scene: Scene, height: float) -> "Section":
-        """The section at a height, m."""
+        """Compute the section at a height, m."""
         lines, faces = scene.cut(height)
         return cls(lines, scene.normals[faces, :2], scene.triangle_object[faces])
 

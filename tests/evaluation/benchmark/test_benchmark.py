@@ -144,12 +144,12 @@ def test_a_remade_recording_is_run_again(toys, tmp_path):
 def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
     asked = []
 
-    def train(kind, data, output, settings, options, *, say):
+    def train(kind, data, output, settings, options, *, log):
         asked.append((kind, options.split, settings.epochs, options.resume))
         if kind == "rotation":
             raise InputError(f"{data}: holds too little")
         output.write_text(options.split)
-        say("epoch 1: loss 1")
+        log("epoch 1: loss 1")
 
     monkeypatch.setattr(networks, "train", train)
     choices = {"methods": [*toys, "learned"], "trained": True, "epochs": 2}

@@ -169,9 +169,9 @@ def test_blind_spans_are_counted_from_the_first_pose(tmp_path):
     clock, run = 1.7e9, write_run(tmp_path / "run")
     poses = np.loadtxt(run / "trajectory.tum")
     np.savetxt(run / "trajectory.tum", poses + [clock, *[0] * 7], fmt="%.9f")
-    assert RunFolder(run).blind is None
+    assert RunFolder(run).unobservable_spans is None
     spans = [span | {"start_s": span["start_s"] + clock, "stop_s": span["stop_s"] + clock} for span in BLIND["spans"]]
-    assert RunFolder(tell(run, blind=BLIND | {"spans": spans})).blind.model_dump() == BLIND
+    assert RunFolder(tell(run, blind=BLIND | {"spans": spans})).unobservable_spans.model_dump() == BLIND
 
 
 def test_blind_spans_stand_in_one_table(tmp_path):

@@ -1,4 +1,4 @@
-"""Exports for radarize_ae, roverd, mmWave Studio's readers and viewers of points, read back on their own."""
+"""Exports for radarize_ae, roverd, mmWave Studio's readers and point viewers, read back by independent code."""
 
 import io
 import json
@@ -28,7 +28,7 @@ RATE = 0.4  # rad/s
 
 
 def poses(times: np.ndarray) -> np.ndarray:
-    """Along x at 0.9 m/s and 1.2 m high, turning left."""
+    """Poses along x at 0.9 m/s and 1.2 m height, turning left."""
     turn = Rotation.from_rotvec(RATE * times[:, None] * [0, 0, 1]).as_quat()
     return np.column_stack([0.9 * times, 0 * times, 1.2 + 0 * times, turn])
 
@@ -152,7 +152,7 @@ def test_depth_of_another_lens_is_refused(tmp_path):
 
 # --- roverd -----------------------------------------------------------------------------------------------------------
 def test_a_sequence_of_roverd(recording, tmp_path):
-    """Words by the reader of the format's authors; velocities of the world; and back."""
+    """Words as read by the format's authors; velocities in the world; and the import of the export."""
     folder = export(recording, "roverd", tmp_path / "walk")
     about = json.loads((folder / "radar/meta.json").read_text())
     assert about["iq"]["shape"] == [8, 3, 4, 192] and about["ts"]["type"] == "f8" and about["valid"]["type"] == "u1"
@@ -160,9 +160,9 @@ def test_a_sequence_of_roverd(recording, tmp_path):
     with Recording(recording) as source:
         assert np.array_equal(iqiq_from_iiqq(words), source.adc(0, COUNT))  # TX1, TX2, TX3
     assert np.fromfile(folder / "radar/valid", "u1").tolist() == [1, 1, 0, 1, 1, 1, 1]
-    told = json.loads((folder / "radar/radar.json").read_text())
-    assert told["range_resolution"] == pytest.approx(CONFIG.range_resolution)
-    assert told["doppler_resolution"] == pytest.approx(CONFIG.velocity_resolution)
+    resolutions = json.loads((folder / "radar/radar.json").read_text())
+    assert resolutions["range_resolution"] == pytest.approx(CONFIG.range_resolution)
+    assert resolutions["doppler_resolution"] == pytest.approx(CONFIG.velocity_resolution)
     chirps = yaml.safe_load((folder / "config.yaml").read_text())["radar"]["args"]["radar"]
     assert chirps["idle_time"] == 122.0 and chirps["freq_slope"] == 80.0 and chirps["device"] == "AWR1843"
     pose = np.load(folder / "_radar/pose.npz")
@@ -176,7 +176,7 @@ def test_a_sequence_of_roverd(recording, tmp_path):
         assert copy.config.tx_order == CONFIG.tx_order == (0, 2, 1)
         for name in ("slope", "idle_time", "adc_start_time", "ramp_end_time", "sample_rate", "frame_period"):
             assert getattr(copy.config, name) == getattr(CONFIG, name), name
-    with pytest.raises(InputError, match="is there already, expected the name of a new folder for the sequence"):
+    with pytest.raises(InputError, match="already exists, expected the name of a new folder for the sequence"):
         export(recording, "roverd", folder)
 
 
@@ -201,7 +201,7 @@ def test_options_that_a_format_has_not(recording, tmp_path):
 
 
 def ply(path: Path) -> tuple[str, np.ndarray]:
-    """Header and table of a binary PLY file."""
+    """Read header and table of a binary PLY file."""
     header, _, data = path.read_bytes().partition(b"end_header\n")
     kinds = {"double": "<f8", "float": "<f4", "int": "<i4"}
     fields = [line.split()[1:] for line in header.decode().splitlines() if line.startswith("property")]
@@ -209,7 +209,7 @@ def ply(path: Path) -> tuple[str, np.ndarray]:
 
 
 def test_points_as_ply(recording, tmp_path):
-    """In the world: the sensor's place, and the point turned with it."""
+    """Points in the world are at the sensor's position, rotated with it."""
     header, table = ply(export(recording, "ply", tmp_path / "points"))
     assert "element vertex 3" in header and "in the world" in header
     turn, place = RATE * MIDDLE[4], 0.9 * MIDDLE[4]

@@ -1,4 +1,4 @@
-"""ROS 2 bags of a recording and its run, read back by the `rosbags` library on its own."""
+"""ROS 2 bags of a recording and its run, read back directly by the `rosbags` library."""
 
 import io
 from pathlib import Path
@@ -78,7 +78,7 @@ def recording(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
-    """A run's folder, made by the SLAM back end from scans and odometry; `radarize run` leaves the same files."""
+    """A run folder made by the SLAM back end from scans and odometry, with the files of `radarize run`."""
     folder = tmp_path_factory.mktemp("run")
     given = {
         "ranges": RANGES,
@@ -93,7 +93,7 @@ def run(tmp_path_factory) -> Path:
 
 
 def read(folder: Path) -> dict[str, list[tuple[float, object]]]:
-    """Messages by topic, with the time they were received at."""
+    """Return messages by topic, with their times of receipt."""
     found: dict[str, list] = {}
     with AnyReader([folder]) as reader:
         for connection, time, data in reader.messages():
@@ -153,18 +153,19 @@ def test_odometry_and_its_transform(bag):
 
 
 def test_covariance_adds_up_as_in_a_simulation():
-    """Many walks whose steps err as their covariance says: positions spread as the bag claims."""
+    """Many walks with errors of the given covariance: the scatter of positions is that in the bag."""
     from radarize.io.exporters.ros2 import _odometry
     from radarize.pipeline.log import Log
 
     rng, error = np.random.default_rng(1), np.diag([0.01, 0.02, 0.01]) ** 2
     errors = ErrorModel.independent(np.tile(error, (COUNT, 1, 1)))
     log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), errors)
-    claimed = [message for _, topic, message in _odometry(log) if topic == "/odom"][-1].pose.covariance.reshape(6, 6)
+    *_, last = [message for _, topic, message in _odometry(log) if topic == "/odom"]
+    covariance = last.pose.covariance.reshape(6, 6)
     walks = np.zeros((20_000, 3))
     for _ in range(COUNT - 1):
         walks = compose(compose(walks, STEP), rng.multivariate_normal(np.zeros(3), error, len(walks)))
-    assert claimed[np.ix_([0, 1, 5], [0, 1, 5])] == pytest.approx(np.cov(walks.T), rel=0.1, abs=2e-4)
+    assert covariance[np.ix_([0, 1, 5], [0, 1, 5])] == pytest.approx(np.cov(walks.T), rel=0.1, abs=2e-4)
 
 
 def test_covariance_of_the_velocity_is_that_of_a_step():
@@ -175,13 +176,13 @@ def test_covariance_of_the_velocity_is_that_of_a_step():
     log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), ErrorModel.independent(np.tile(error, (COUNT, 1, 1))))
     twists = [message.twist for _, topic, message in _odometry(log) if topic == "/odom"]
     for twist in (twists[0], twists[7]):
-        claimed = twist.covariance.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
-        assert claimed == pytest.approx(error / CONFIG.frame_period**2, rel=0.02, abs=1e-4)
+        covariance = twist.covariance.reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
+        assert covariance == pytest.approx(error / CONFIG.frame_period**2, rel=0.02, abs=1e-4)
         assert twist.twist.linear.x == pytest.approx(STEP[0] / CONFIG.frame_period, abs=1e-4)
 
 
 def place(links, frame, root) -> np.ndarray:
-    """Pose of a frame in another as a matrix, by the transforms between them, child to parent."""
+    """Return the pose of a frame in another as a matrix, from the chain of transforms between them."""
     found = np.eye(4)
     while frame != root:
         parent, t = links[frame]
@@ -194,7 +195,7 @@ def place(links, frame, root) -> np.ndarray:
 
 
 def test_the_truth_hangs_in_one_tree_with_the_odometry(bag, recording, tmp_path):
-    """With a run, both begin as one and drift apart; without one, base_link is where the truth is."""
+    """With a run, truth and odometry start at the same pose and drift apart; without one, base_link is at the truth."""
     links = {t.child_frame_id: (t.header.frame_id, t.transform) for t in bag["/tf_static"][0][1].transforms}
     expected = planar_poses(poses())
     for _, tf in bag["/tf"]:
@@ -208,7 +209,7 @@ def test_the_truth_hangs_in_one_tree_with_the_odometry(bag, recording, tmp_path)
 
 
 def test_stamps_near_zero_are_moved(recording, tmp_path):
-    """A simulator's walk begins at 0 s, which ROS takes for no stamp; a real one's stays."""
+    """A simulated walk begins at 0 s, which ROS treats as unset, so it is shifted; stamps of a real one are kept."""
     with Recording(recording) as source, RecordingWriter(tmp_path / "a.h5", CONFIG) as writer:
         writer.append(source.adc(0, 3), STAMPS[:3] - STAMPS[0])
     for later, given in ((1.7e9, None), (0.0, 0.0), (5.0, 5.0)):
@@ -256,7 +257,7 @@ def test_other_sensors(bag, recording):
 
 
 def test_places_of_sensors(bag):
-    """What the camera calls forward (z) is the radar's x, what it calls right (x) the radar's -y."""
+    """The camera's forward axis (z) is the radar's x, its right axis (x) the radar's -y."""
     found = {t.child_frame_id: (t.header.frame_id, t.transform) for t in bag["/tf_static"][0][1].transforms}
     assert {child: parent for child, (parent, _) in found.items()} == {
         "radar": "base_link", "imu": "base_link", "camera_depth_frame": "base_link",
@@ -278,7 +279,7 @@ def test_parts_of_it(recording, run, tmp_path):
 def test_refusals(recording, run, tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "mine").touch()
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="already exists"):
         export(recording, "ros2", tmp_path / "there")
     with pytest.raises(InputError, match="expected a recording and a run"):
         export(run, "ros2", tmp_path / "x", run=run)

@@ -148,7 +148,7 @@ class BagWriter:
 
 
 def write_published(path: Path, source: Path, version: int = 1, storage: StoragePlugin = StoragePlugin.SQLITE3) -> Path:
-    """A recording as a bag; its tracking poses, IMU, depth and points come along as far as there are any."""
+    """Write a recording as a bag, with its tracking poses, IMU, depth and points."""
     with Recording(source) as recording, BagWriter(path, version, storage) as bag:
         config, middle = recording.config, recording.times + recording.config.burst_center
         events = [(time + config.burst_time, bag.frame, (k,)) for k, time in enumerate(recording.times)]

@@ -21,8 +21,8 @@ CHIRPS = {
 }  # fmt: skip
 
 
-def chirps(path: Path, told: dict) -> None:
-    path.write_text(yaml.safe_dump({"radar": {"type": "radar", "args": {"radar": told}}}))
+def chirps(path: Path, fields: dict) -> None:
+    path.write_text(yaml.safe_dump({"radar": {"type": "radar", "args": {"radar": fields}}}))
 
 
 def write_sequence(folder: Path) -> Path:

@@ -27,7 +27,7 @@ def imported(path: Path, **more) -> np.ndarray:
 
 
 def matlab73(path: Path, values: np.ndarray) -> Path:
-    """As MATLAB writes version 7.3: HDF5 with axes turned round, complex entries as pairs."""
+    """Write an array as MATLAB version 7.3: HDF5 with reversed axes, complex entries as pairs."""
     pairs = np.empty(values.T.shape, [("real", "<f4"), ("imag", "<f4")])
     pairs["real"], pairs["imag"] = values.T.real, values.T.imag
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -68,7 +68,7 @@ def test_axes_in_any_order(tmp_path_factory, order, pairs):
 
 
 def test_joined_and_fired_axes(tmp_path):
-    """TX1, TX3, TX2 is the order of firing here."""
+    """The firing order is TX1, TX3, TX2."""
     path = tmp_path / "a.npy"
     np.save(path, CUBE.reshape(3, 4, 12, 32))
     assert np.array_equal(imported(path, shape="frame,loop,virtual,sample"), FRAMES)
@@ -88,7 +88,7 @@ def test_joined_and_fired_axes(tmp_path):
 
 
 def test_without_a_configuration(tmp_path):
-    """Lengths come from the array; swapped I and Q show in the samples."""
+    """Lengths come from the array; exchanged I and Q are found from the samples."""
     np.save(tmp_path / "a.npy", CUBE.imag + 1j * CUBE.real)
     out = import_recording(tmp_path / "a.npy", tmp_path / "a.h5")
     with Recording(out) as recording:
@@ -103,7 +103,8 @@ def test_without_a_configuration(tmp_path):
 
 
 def test_the_people_of_a_public_capture(recordings, tmp_path):
-    """Two people at 2.93 m, one coming, one going, and something at rest at 5.22 m (samples as unsigned words)."""
+    """Two people at 2.93 m, one approaching, one receding, and a static object at 5.22 m (samples as unsigned
+    words)."""
     given = {"tx": (0, 2), "start_frequency": 77e9, "slope": 60.012e12, "sample_rate": 2.5e6, "idle_time": 30e-6,
              "ramp_end_time": 62e-6, "adc_start_time": 6e-6}  # fmt: skip
     source = recordings / "xwr-moving-people" / "doppler_example_1.npy"
@@ -136,7 +137,7 @@ def test_values_that_are_no_counts(tmp_path):
     loud = CUBE * 1000
     np.save(path, np.rint(loud))
     with Recording(import_recording(path, tmp_path / "a.h5", Given(config=CONFIG))) as recording:
-        assert "values lie outside of 16 bits" in recording.attributes["warnings"]
+        assert "values exceed 16 bits" in recording.attributes["warnings"]
     holed = CUBE.copy()
     holed[1, 2, 1, 0, 7] = np.nan
     holed[2, 0, 0] = 0
@@ -147,7 +148,7 @@ def test_values_that_are_no_counts(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_array(tmp_path, monkeypatch):
-    """Four times the frames, a fifth more memory at most; whatever the order of axes."""
+    """Four times as many frames need at most a fifth more memory, for any order of axes."""
     monkeypatch.setattr("radarize.io.importers.capture.BATCH_BYTES", 4 * CONFIG.frame_bytes)
     for packed, shape in itertools.product((False, True), ("frame,loop,tx,rx,sample", "loop,tx,rx,sample,frame")):
         peaks = []
@@ -166,7 +167,7 @@ def test_memory_does_not_grow_with_the_array(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("values", "more", "message"),
     [
-        (CUBE[0], {}, "has shape .* expected shape to say"),
+        (CUBE[0], {}, "has shape .* expected the option shape to name"),
         (CUBE, {"shape": "frame,loop,tx,rx"}, "shape is 'frame,loop,tx,rx', expected names"),
         (CUBE, {"shape": "frame,loop,loop,rx,sample"}, "expected names of axes, each once"),
         (CUBE, {"shape": "frame,chirp,tx,rx,sample"}, "expected names of axes, each once"),

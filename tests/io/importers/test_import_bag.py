@@ -132,7 +132,7 @@ def test_tracked_poses_are_brought_to_the_frames(original, imported, motion):
 
 def test_the_same_trajectory_comes_out(original, bag, imported, tmp_path):
     if bag.is_dir():
-        pytest.skip("the samples are the same, as another test says: one bag is enough")
+        pytest.skip("the samples are the same, as another test checks: one bag is sufficient")
     found = []
     for path in (original, imported):
         out = run(path, tmp_path / path.stem, odometry="doppler", scans="first-echo").path
@@ -163,7 +163,7 @@ def write(path: Path, config: RadarConfig, times, **more) -> Path:
 
 
 def test_calibration_and_sizes_come_from_the_frames(tmp_path):
-    """Virtual antenna of TX2, RX3 gets its own factor, whatever order transmitters fire in."""
+    """The virtual antenna of TX2 and RX3 gets its own factor in any firing order."""
     factors = np.random.default_rng(1).normal(size=(12, 2)).astype(np.float32).round(3)
     config = SMALL.model_copy(update={"range_bias": 0.07})
     write(tmp_path / "a.bag", config, 0.05 * np.arange(3), calibration=factors)
@@ -177,7 +177,7 @@ def test_calibration_and_sizes_come_from_the_frames(tmp_path):
 
 
 def test_bags_without_definitions_are_read(tmp_path):
-    """Of ROS 2 Humble and before: the frame's message is xwr_raw_ros's own."""
+    """In bags of ROS 2 Humble and before, the frame's message is that of xwr_raw_ros."""
     config = SMALL.model_copy(update={"range_bias": 0.0625})
     with BagWriter(tmp_path / "a", 2, published=True) as bag:
         for k, frame in enumerate(noise(config, 3)):
@@ -194,7 +194,7 @@ def test_bags_without_definitions_are_read(tmp_path):
 
 
 def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
-    """Received 30 ms after their start. Nothing said: the burst's length, 1 ms, is the least."""
+    """Received 30 ms after their start. Without a given latency, the burst duration, 1 ms, is used."""
     times = 0.05 * np.arange(3)
     write(tmp_path / "a.bag", SMALL, times, latency=0.03)
     with BagWriter(tmp_path / "b.bag", 1) as bag:
@@ -216,7 +216,7 @@ def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
 
 
 def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path):
-    """Receipts are late by 4 ms in the mean, once by 0.4 s; clocks differ by 80 ppm; three frames are missing."""
+    """Receipts are delayed by 4 ms on average, once by 0.4 s; clocks differ by 80 ppm; three frames are missing."""
     rng = np.random.default_rng(3)
     starts = SMALL.frame_period * (1 + 80e-6) * np.delete(np.arange(600), [100, 101, 300])
     received = starts + SMALL.burst_time + rng.exponential(4e-3, len(starts))
@@ -234,7 +234,7 @@ def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path)
 
 @pytest.mark.parametrize("jump", [0.2, 1.0, 3600.0])
 def test_a_header_ahead_of_its_receipt_is_not_believed(tmp_path, jump):
-    """The others are kept, also where headers go on by half a second after a pause."""
+    """The other headers are kept, also when they advance by half a second after a pause."""
     times = SMALL.frame_period * np.arange(60)
     times[40:] += 0.5
     stamps = times.copy()
@@ -254,16 +254,16 @@ def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
     with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         assert recording.times - EPOCH == pytest.approx(np.unique(times), abs=1e-6)
         assert "2 frames are missing" in recording.attributes["warnings"]
-        assert "1 frames came again" in recording.attributes["warnings"]
+        assert "1 frames are repeated" in recording.attributes["warnings"]
 
 
 def test_an_imu_is_read_on_the_radars_axes(tmp_path):
-    """As a tracking camera has it: in an optical frame. Where neither the frame's name nor the user says so, it is
-    no IMU on the radar's axes, for gravity is felt along another."""
+    """The IMU of a tracking camera has an optical frame. If neither the frame's name nor the user states this, it is
+    not on the radar's axes, since gravity is along another one."""
     force, turn = np.array([0.3, -0.2, 9.8]), np.array([0.1, 0.2, 0.5])
     optical = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])  # x right, y down, z ahead
     named, given = Given(config=SMALL), Given(config=SMALL, imu_turn=(-90.0, 0.0, -90.0))
-    for frame, told, known in (
+    for frame, options, known in (
         ("tracking_imu_optical_frame", named, True),
         ("imu", given, True),
         ("imu", named, False),
@@ -274,7 +274,7 @@ def test_an_imu_is_read_on_the_radars_axes(tmp_path):
                 for tick in 0.05 * k + 0.005 * np.arange(10):
                     bag.imu(tick, optical @ force, optical @ turn, frame)
         (tmp_path / "a.h5").unlink(missing_ok=True)
-        with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", told)) as recording:
+        with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", options)) as recording:
             assert ("imu/mount" in recording.attributes["assumed"]) == (not known)
             if known:
                 found = Imu.of(recording).samples
@@ -303,7 +303,7 @@ def test_poses_are_unknown_where_tracking_was_lost(tmp_path):
 
 
 def test_a_silent_radar_does_not_keep_the_others_waiting(tmp_path):
-    """Ten seconds without frames: messages are forgotten, and the frames after it still get their poses."""
+    """After ten seconds without frames, earlier messages are dropped, and the next frames still get their poses."""
     with BagWriter(tmp_path / "a.bag", 1) as bag:
         frames = noise(SMALL, 20)
         for k in range(1200):
@@ -329,7 +329,7 @@ def test_damaged_depth_pictures_are_counted(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_bag(tmp_path, monkeypatch):
-    """Four times the messages, a quarter more memory at most."""
+    """Four times as many messages need at most a quarter more memory."""
     monkeypatch.setattr("radarize.io.importers.capture.BATCH_BYTES", 16 * SMALL.frame_bytes)
     peaks = []
     for seconds in (10, 40):
@@ -357,7 +357,7 @@ def test_a_bag_without_raw_samples_is_refused(recordings, tmp_path):
 
 
 def test_point_clouds_of_a_real_bag(recordings):
-    """Clouds of TI's ROS driver: in front of the radar, and closing when the sensor moves forward."""
+    """Clouds of TI's ROS driver are in front of the radar, and close when the sensor moves forward."""
     from radarize.io.importers.companions import cloud_columns
     from radarize.io.importers.rosbag import Bag
 
@@ -384,7 +384,7 @@ def test_refusals(tmp_path):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(InputError, match=f"{name}: is no readable ROS bag"):
             import_recording(tmp_path / name, tmp_path / "out.h5", Given(config=SMALL))
-    with pytest.raises(InputError, match="2 frames have not the 73728 words"):
+    with pytest.raises(InputError, match="2 frames do not have the 73728 words"):
         import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=CONFIG))
     with pytest.raises(InputError, match="stamps of its own, but start_time is 5"):
         import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=SMALL, start_time=5.0))
@@ -407,7 +407,7 @@ LAST = "where timestamp = (select max(timestamp) from messages)"
 
 
 @pytest.mark.parametrize(
-    ("change", "value", "said"),
+    ("change", "value", "message"),
     [
         (f"messages set timestamp = ? {LAST}", "noon", "/radar0/radar_data has no number for its time, 'noon'"),
         (f"messages set timestamp = ? {LAST}", b"noon", "/radar0/radar_data has no number for its time, b'noon'"),
@@ -417,15 +417,15 @@ LAST = "where timestamp = (select max(timestamp) from messages)"
         ("topics set type = ?", b"type", ""),
     ],
 )
-def test_values_of_any_type_are_refused(tmp_path, change, value, said):
-    """SQLite keeps anything in any column."""
+def test_values_of_any_type_are_refused(tmp_path, change, value, message):
+    """SQLite accepts values of any type in any column."""
     with BagWriter(tmp_path / "a", 2) as bag:
         for k, frame in enumerate(noise(SMALL, 3)):
             bag.frame(0.05 * k, frame, SMALL)
     (path,) = (tmp_path / "a").glob("*.db3")
     with sqlite3.connect(path) as base:
         base.execute(f"update {change}", [value])
-    with pytest.raises(InputError, match=f"a.db3: .*{said}"):
+    with pytest.raises(InputError, match=f"a.db3: .*{message}"):
         import_recording(path, tmp_path / "out.h5", Given(config=SMALL))
     assert not (tmp_path / "out.h5").exists()
 

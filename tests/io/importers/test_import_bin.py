@@ -256,7 +256,7 @@ def test_bad_poses_are_refused_before_anything_is_written(tmp_path, text, messag
 # --- parts -----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("part", [0, 1, 2])
 def test_parts_of_a_capture_are_joined(tmp_path, part):
-    """Cut within a word; eleven of them, so that 10 does not come after 1."""
+    """Eleven parts, cut within a word; the number 10 sorts after 9."""
     frames = room(CONFIG, 6)
     data = encode(frames, CONFIG).tobytes()
     cuts = np.linspace(0, len(data), 12).astype(int) | 1
@@ -285,14 +285,14 @@ def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
 
 
 def quiet(count: int = 3) -> np.ndarray:
-    """Frames as real ones are: far from full scale."""
+    """Frames with the level of real ones, far below full scale."""
     return np.random.default_rng(1).normal(0, 200, (count, *CONFIG.frame_shape)).astype(np.int16)
 
 
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        (lambda raw: (raw.astype(np.int32) + 2**15).astype("<u2").tobytes(), "--encoding offset-binary reads"),
+        (lambda raw: (raw.astype(np.int32) + 2**15).astype("<u2").tobytes(), "use --encoding offset-binary"),
         (lambda raw: raw.astype("<f8").tobytes(), r"floating-point numbers \(complex128\)"),
         (lambda raw: (raw / 7).astype("<f4").tobytes(), r"floating-point numbers \(complex64\)"),
         (lambda raw: raw.tobytes(), None),
@@ -316,10 +316,10 @@ def test_offset_binary(tmp_path):
         import_recording(tmp_path / "a.npy", tmp_path / "b.h5", given)
 
 
-def test_one_chirp_a_loop_is_told_where_it_is_assumed(tmp_path):
+def test_an_assumed_single_chirp_per_loop_is_a_warning(tmp_path):
     (tmp_path / "a.bin").write_bytes(encode(quiet(), CONFIG).tobytes())
     counts = {"samples": CONFIG.samples, "loops": CONFIG.loops * 3, "rx": 4}
-    for more, told in (({}, True), ({"tx": 1}, False)):
+    for more, warned in (({}, True), ({"tx": 1}, False)):
         given = Given(overrides=counts | more)
         with Recording(import_recording(tmp_path / "a.bin", tmp_path / "a.h5", given)) as recording:
-            assert ("all speeds would be doubled" in recording.attributes["warnings"]) == told
+            assert ("all speeds are doubled" in recording.attributes["warnings"]) == warned

@@ -1,4 +1,4 @@
-"""Captures of other boards: which one is assumed, and real samples."""
+"""Captures of other boards: assumed boards, and real samples."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_what_is_lost_is_in_the_recording(tmp_path):
 
 @pytest.mark.parametrize("commands", [AWR2944, PRESENCE, PRESENCE.replace("256 1 28", "256 4 28")])
 def test_captures_of_real_samples(tmp_path, commands):
-    """The configuration says so: no option is needed, and none is asked for."""
+    """The configuration determines it: no option is needed."""
     source, config, frames = capture(tmp_path, commands)
     with load(source) as recording:
         assert recording.config == config and "layout" not in warnings(recording)

@@ -1,4 +1,4 @@
-"""Network captures with more than one capture of a radar, and with packets that are not whole."""
+"""Network captures with several captures of a radar, and with incomplete packets."""
 
 import socket
 import struct
@@ -53,10 +53,10 @@ def test_each_capture_becomes_a_recording(tmp_path, case):
     for name, walk, number in (("b.h5", walks[0], 1), ("b-2.h5", walks[1], 2)):
         with Recording(tmp_path / name) as recording:
             assert np.array_equal(recording.adc(0, 99), walk) and recording.valid(0, 99).all()
-            told = recording.attributes["warnings"]
-            assert "holds 2 captures" in told and f"this is capture {number}" in told
-            assert f"capture 1 is in {tmp_path}/b.h5; capture 2 is in {tmp_path}/b-2.h5" in told
-    with pytest.raises(InputError, match="b-2.h5: is there already, and capture 2 of 2"):
+            warnings = recording.attributes["warnings"]
+            assert "holds 2 captures" in warnings and f"this is capture {number}" in warnings
+            assert f"capture 1 is in {tmp_path}/b.h5; capture 2 is in {tmp_path}/b-2.h5" in warnings
+    with pytest.raises(InputError, match="b-2.h5: already exists, and capture 2 of 2"):
         import_recording(source, tmp_path / "b.h5", Given(CONFIG))
     for number, walk in enumerate(walks, 1):
         import_recording(source, tmp_path / "c.h5", Given(CONFIG, capture=number))
@@ -81,7 +81,7 @@ def test_from_python_and_the_command_line(tmp_path):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_bad_network_starts_no_radar(tmp_path, seed):
-    """Lost, repeated, late and forged packets, and a gap of half a walk."""
+    """Two starts with lost, repeated, late and forged packets, and a gap of half a walk."""
     rng, data = np.random.default_rng(seed), sent(np.concatenate([*WALKS] * 10))
     kept = [packet for packet in data if rng.random() > 0.05]
     for place in rng.integers(0, len(kept) - 80, 40):

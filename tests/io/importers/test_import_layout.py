@@ -1,4 +1,4 @@
-"""Words that lie otherwise than a DCA1000's two lanes write them: read right, and noticed where read otherwise."""
+"""Words in another order than that of a DCA1000's two lanes: decoded correctly, and detected if the option is wrong."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ REAL = CONFIG.model_copy(update={"samples": 2 * CONFIG.samples, "sample_rate": 2
 
 
 def interleaved(frames: np.ndarray, config: RadarConfig) -> bytes:
-    """Word by word, as SWRA581 draws it: of each sample I of all receivers, then Q of all."""
+    """Write words as in the figure of SWRA581: for each sample I of all receivers, then Q of all."""
     words = []
     for frame in frames:
         for loop in frame:
@@ -30,7 +30,7 @@ def interleaved(frames: np.ndarray, config: RadarConfig) -> bytes:
 
 
 def real(count: int, noise: float = 30.0) -> tuple[bytes, np.ndarray]:
-    """Cosines of echoes, and the complex exponentials that they are halves of."""
+    """Cosines of echoes, and complex exponentials of half their amplitude."""
     rng = np.random.default_rng(0)
     loops, tx, rx, samples, _ = CONFIG.frame_shape
     bins, gains = rng.integers(1, samples // 2, 6), 1000 * np.exp(2j * np.pi * rng.random((tx, rx, 6)))
@@ -63,7 +63,7 @@ def test_real_samples_become_the_exponentials_of_their_cosines(tmp_path):
 
 
 def test_what_lies_otherwise_is_noticed(tmp_path):
-    """Each layout read as each: a warning names the right one, and only where another was read."""
+    """Each layout decoded as each: a warning names the correct one, and only if another was used."""
     frames = room(CONFIG, 4)
     written = {"interleaved": interleaved(frames, CONFIG), "real": real(4)[0]}
     written["pairs"] = encode(frames, CONFIG).tobytes()
@@ -71,7 +71,7 @@ def test_what_lies_otherwise_is_noticed(tmp_path):
         for given in LAYOUTS:
             config = REAL if layout == "real" else CONFIG
             _, _, warnings = imported(tmp_path / "a.bin", data, Given(config, layout=given))
-            assert (f"--layout {layout} reads those" in warnings) == (layout != given), (layout, given, warnings)
+            assert (f"use --layout {layout}" in warnings) == (layout != given), (layout, given, warnings)
             assert "--layout" not in warnings or layout != given
 
 
@@ -80,7 +80,7 @@ def test_a_real_capture_is_told_from_itself_interleaved(recordings, tmp_path):
         frames, config = recording.adc(0, 1), recording.config
         assert "--layout" not in recording.attributes["warnings"]
     _, _, warnings = imported(tmp_path / "a.bin", interleaved(frames, config), Given(config))
-    assert "--layout interleaved reads those" in warnings
+    assert "use --layout interleaved" in warnings
 
 
 def test_only_raw_words_lie_somehow(tmp_path):

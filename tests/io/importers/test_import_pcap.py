@@ -47,8 +47,8 @@ INTERFACE = struct.pack("<IIHHII", 1, 20, 1, 0, 0, 20)
 
 
 def pcapng(path: Path, data: list[bytes]) -> Path:
-    """Written field by field after the draft, so that the library that reads it is not asked about itself."""
-    blocks = [SECTION, INTERFACE, struct.pack("<III", 5, 12, 12)]  # and one that says nothing here
+    """Write a file field by field from the draft, independently of the library that reads it."""
+    blocks = [SECTION, INTERFACE, struct.pack("<III", 5, 12, 12)]  # and an irrelevant one
     for i, packet in enumerate(data):
         padded = packet + bytes(-len(packet) % 4)
         high, low = divmod(int((1000 + i + 0.5) * 1e6), 2**32)
@@ -74,14 +74,14 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path):
         assert len(recording) == 1
         assert recording.config.iq_order == "qqii"
         assert recording.valid(0, 1).all()
-        assert recording.attributes["warnings"].startswith("one chirp a loop is assumed")
+        assert recording.attributes["warnings"].startswith("a single chirp per loop, of TX1, is assumed")
         adc = recording.adc(0, 1)[0, :, 0, 0].astype(float)
     signal = adc[..., 0] + 1j * adc[..., 1]
     spectrum = np.fft.fft((signal - signal.mean(axis=1, keepdims=True)) * np.hanning(256), axis=1)
     power = (np.abs(spectrum) ** 2).mean(axis=0)
     peaks = [k for k in range(5, 250) if power[k] == power[k - 3 : k + 4].max()]
     assert sorted(peaks, key=lambda k: -power[k])[:2] == [59, 39]
-    # A static room: chirps are alike (README: correlation 0.998).
+    # A static room: chirps are equal (README: correlation 0.998).
     unit = signal / np.linalg.norm(signal, axis=1, keepdims=True)
     assert np.abs((unit[1:] * unit[:-1].conj()).sum(axis=1)).mean() == pytest.approx(0.998, abs=0.001)
 
@@ -208,6 +208,6 @@ def test_byte_counts_that_leap_are_damage_not_loss(tmp_path):
     sent = list(packets(encode(FRAMES, CONFIG).tobytes()))
     far = [Packet(99 + k, 200_000_000 + len(sent[1].payload) * k, sent[1].payload) for k in range(4)]
     source = pcap(tmp_path / "a.pcap", [udp(packet.encode()) for packet in (*sent, *far)])
-    with pytest.raises(InputError, match="a.pcap: lacks more than .* expected byte counts that grow"):
+    with pytest.raises(InputError, match="a.pcap: lacks more than .* expected byte counts that increase"):
         imported(source)
     assert not (tmp_path / "a.h5").exists()

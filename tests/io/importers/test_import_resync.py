@@ -1,4 +1,4 @@
-"""Raw captures in which bytes are missing, or frames have another size from somewhere on."""
+"""Raw captures with missing bytes, or with another frame size after some frames."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_several_gaps(tmp_path):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_moved_where_nothing_is_missing(tmp_path, seed):
-    """Not where packets were lost and filled with zeros, either, nor where a chirp is disturbed."""
+    """Neither lost packets filled with zeros nor a disturbed chirp are taken for missing bytes."""
     frames = walk(12, seed=seed)
     frames[3, 4:7] = 0
     frames[6, 9, 1] = np.random.default_rng(seed).integers(-5000, 5000, frames.shape[3:])
@@ -74,6 +74,7 @@ def test_frames_of_another_size_end_a_capture(tmp_path, change):
     other = CONFIG.model_copy(update=change)
     with imported(tmp_path, DATA[: 20 * CONFIG.frame_bytes] + encode(walk(30, other), other).tobytes()) as recording:
         assert np.array_equal(recording.adc(0, 99)[:20], FRAMES[:20]) and len(recording) <= 21
-        told = recording.attributes["warnings"]
+        warnings = recording.attributes["warnings"]
         period = len(other.tx) * 4 * other.samples
-        assert f"on, samples repeat every {period} and not every 768 as before" in told and "bytes are left out" in told
+        assert f"on, samples repeat every {period} and not every 768 as before" in warnings
+        assert "bytes are left out" in warnings

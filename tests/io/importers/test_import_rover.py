@@ -1,4 +1,4 @@
-"""Sequences in roverd's layout: words, stamps, lost packets and poses against another reader, and what is off."""
+"""Sequences in roverd's layout: words, stamps, lost packets and poses against another reader; damaged sequences."""
 
 import json
 
@@ -19,14 +19,14 @@ def sequence(tmp_path):
 
 
 def test_samples_are_those_that_another_reader_sees(sequence, tmp_path):
-    """Against the reader of the rig's own authors, whose package the layout comes with."""
+    """Import compared with the reader of the rig's authors."""
     with Recording(import_recording(sequence, tmp_path / "a.h5", Given())) as recording:
         words = np.fromfile(sequence / "radar/iq", "<i2").reshape(FRAMES, RADAR.loops, 3, 4, -1)
         assert np.array_equal(recording.adc(0, FRAMES), iqiq_from_iiqq(words))
         assert np.allclose(recording.times, 1.7e9 + 0.05 * np.arange(FRAMES))
-        for name, told in RADAR.model_dump().items():
+        for name, value in RADAR.model_dump().items():
             if name not in ("board", "rx_gain_db", "high_pass", "channel_calibration", "tx_backoff_db", "range_bias"):
-                assert getattr(recording.config, name) == pytest.approx(told), name
+                assert getattr(recording.config, name) == pytest.approx(value), name
         lost = np.ones((FRAMES, RADAR.loops, 3), bool)
         lost[2, 1, 2] = False
         assert np.array_equal(recording.valid(0, FRAMES), lost)
@@ -36,11 +36,11 @@ def test_samples_are_those_that_another_reader_sees(sequence, tmp_path):
         assert Rotation.from_quat(poses[-1, 3:]).as_euler("zyx") == pytest.approx([1, 0, 0])
 
 
-def test_a_sequence_without_configuration_has_the_chirps_that_its_resolutions_say(sequence, tmp_path):
+def test_a_sequence_without_configuration_has_the_chirps_of_its_resolutions(sequence, tmp_path):
     """Slope and idle time follow from range and Doppler resolution, given the sampling rate."""
     (sequence / "config.yaml").unlink()
-    told = {"range_resolution": RADAR.range_resolution, "doppler_resolution": RADAR.velocity_resolution}
-    (sequence / "radar/radar.json").write_text(json.dumps(told))
+    resolutions = {"range_resolution": RADAR.range_resolution, "doppler_resolution": RADAR.velocity_resolution}
+    (sequence / "radar/radar.json").write_text(json.dumps(resolutions))
     with Recording(import_recording(sequence, tmp_path / "a.h5", Given())) as recording:
         assert recording.config.slope == pytest.approx(RADAR.slope, rel=1e-9)
         assert recording.config.range_resolution == pytest.approx(RADAR.range_resolution)

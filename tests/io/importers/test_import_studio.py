@@ -28,7 +28,7 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path, source):
     with Recording(import_recording(source, tmp_path / "a.h5")) as recording:
         assert len(recording) == 1
         assert recording.config.frame_shape == (85, 3, 4, 512, 2)
-        # Its setup says iwr6843, which is on three boards.
+        # Its setup names iwr6843, the chip of three boards.
         assert recording.attributes["warnings"] == assumed_board(recording.config) and recording.config.board == ISK
         adc = recording.adc(0, 1)[0].astype(float)
         ranges = recording.config.ranges

@@ -1,4 +1,4 @@
-"""Jobs on a real Ray cluster, by the same call; a comparison's steps on it."""
+"""Jobs on a real Ray cluster with the same call, and the steps of a comparison on it."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tests.io.jobs.work import Fall, Threads, Wait, refuse
 
 
 def test_jobs_end_as_they_do_here(cluster, tmp_path, monkeypatch):
-    """Paths hold that are relative to where the program runs."""
+    """Relative paths refer to the folder in which the program runs."""
     monkeypatch.chdir(tmp_path)
     Path("fall").mkdir()
     jobs = {"a": Wait(Path("go")), "b": refuse, "c": Fall(Path("fall"), 1), "d": Threads(early=False)}

@@ -1,4 +1,4 @@
-"""Jobs on local processes: results, sentences, deaths, interrupts, threads."""
+"""Jobs in local processes: results, error sentences, killed workers, interrupts, threads."""
 
 import multiprocessing
 import os
@@ -15,7 +15,7 @@ CORES = len(os.sched_getaffinity(0))
 
 
 def ends(news) -> dict[str, object]:
-    """Results or sentences by name."""
+    """Return results or error sentences by name."""
     return {each.name: each.result if each.error is None else each.error for each in news if each.ended}
 
 
@@ -33,12 +33,12 @@ def test_a_job_is_begun_again_once(tmp_path):
     (tmp_path / "once").mkdir(), (tmp_path / "always").mkdir()
     found = ends(perform({"once": Fall(tmp_path / "once", 1), "always": Fall(tmp_path / "always", 9)}, workers=1))
     assert found["once"] == "stands"
-    assert found["always"].startswith("always: its process was killed, twice; most often memory is short")
+    assert found["always"].startswith("always: its process was killed twice; usually memory is short")
     assert len(list((tmp_path / "always").iterdir())) == 2
 
 
 def test_a_worker_that_dies_at_rest_is_replaced(tmp_path):
-    """Killed between two jobs, as the system does when memory is short."""
+    """A worker is killed between two jobs, as by the system when memory is short."""
     found = {}
     for news in perform({name: Sleep(tmp_path / name, 0.0) for name in "ab"}, workers=1):
         if news.ended:
@@ -51,7 +51,7 @@ def test_a_worker_that_dies_at_rest_is_replaced(tmp_path):
 
 
 def test_an_interrupt_ends_the_workers_and_no_other_child(tmp_path):
-    """Children of the program's own, such as a live page's or a reader's, are not the jobs' to end."""
+    """Other child processes of the program, such as those of a live page or a reader, are not ended."""
     other = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(600,), daemon=True)
     other.start()
     try:
@@ -70,7 +70,7 @@ def test_an_interrupt_ends_the_workers_and_no_other_child(tmp_path):
 @pytest.mark.skipif(CORES < 2, reason="one core has one share")
 @pytest.mark.parametrize("job", [Threads(early=True), Threads(early=False)], ids=["before", "after"])
 def test_each_worker_has_its_share_of_the_cores(job, monkeypatch, tmp_path):
-    """Of threads that really run, in a kernel that is compiled late, and of libraries loaded before or after."""
+    """Numbers of threads that really run, in a kernel compiled late, and in libraries loaded before or after."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)

@@ -1,4 +1,4 @@
-"""Jobs that tests give to other processes."""
+"""Jobs for tests of parallel execution."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ from radarize.io.errors import InputError
 
 @dataclass(frozen=True)
 class Sleep:
-    """Says which process does it, in a file, and lasts."""
+    """Writes its process number to a file, and sleeps."""
 
     path: Path
     seconds: float = 600.0
@@ -28,7 +28,7 @@ class Sleep:
 
 @dataclass(frozen=True)
 class Wait:
-    """Reports half of itself, and lasts until a file is there."""
+    """Reports a progress of one half until a file exists."""
 
     path: Path
 
@@ -42,7 +42,7 @@ class Wait:
 
 @dataclass(frozen=True)
 class Fall:
-    """Ends its process, as often as it is told to."""
+    """Kills its process, as many times as given."""
 
     folder: Path
     times: int
@@ -74,7 +74,7 @@ def _warm(count):
 
 @dataclass(frozen=True)
 class Threads:
-    """How many threads of each library there really are.
+    """Number of running threads of each library.
 
     Attributes:
         early: what the job needs was loaded before it came.

@@ -1,4 +1,4 @@
-"""Augmentations: both signs of everything, and that they change no more than they say."""
+"""Augmentations: all signs occur, and nothing else changes."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_labels_follow_their_maps():
 
 
 def test_signs_of_all_tasks():
-    """Whatever is drawn, the maps that come out are those of the label that comes out."""
+    """Augmented maps fit the augmented label, for any random numbers."""
     generator = torch.Generator().manual_seed(0)
     count = 64
     maps = items(ridge(np.repeat(VELOCITY, count, axis=0))).repeat(1, 1, 2, 1, 1)
@@ -59,7 +59,7 @@ def test_signs_of_all_tasks():
     found, turn = find_task("rotation").augment(maps, torch.tensor([[0.2, 0.3, 0.1]]).repeat(count, 1), generator)
     moved = found[:, 0, 0, 8].argmax(dim=1) - found[:, 1, 0, 8].argmax(dim=1)
     assert torch.equal(moved.sign(), turn[:, 0].sign().long()) and len(turn[:, 0].unique()) == 2
-    assert torch.allclose(turn[:, 1:].abs(), torch.tensor([0.3, 0.1]), atol=0.05)  # told with some doubt
+    assert torch.allclose(turn[:, 1:].abs(), torch.tensor([0.3, 0.1]), atol=0.05)  # given with some error
     assert torch.equal(turn[:, 2].sign(), turn[:, 0].sign())  # mirrored with the maps
 
     shown, label = walls(count, np.random.default_rng(0))
@@ -85,7 +85,7 @@ def test_signs_of_all_tasks():
     ],
 )
 def test_effects_are_of_their_size(effect, least, most):
-    """dB; peaks move little, and what adds power never takes any away."""
+    """Effects on dB: peaks move little, and added power never reduces a cell."""
     maps = items(np.repeat(ridge(VELOCITY), 50, axis=0)).repeat(1, 2, 1, 1, 1)
 
     def change(where: bool) -> torch.Tensor:

@@ -1,4 +1,4 @@
-"""Maps for training: what they show, that stored and fresh ones agree, and their size."""
+"""Maps for training: content, agreement of stored and computed ones, and size."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_columns_mirror_by_flipping():
 
 
 def test_no_flash_drowns_the_ridge():
-    """An echo 60 dB above another at its own speed: limited, 20 dB of that are left, and the weak one shows."""
+    """An echo 60 dB above another one at its own speed is limited to 20 dB above it, and the weak one is visible."""
     heatmaps = Heatmaps(PRESETS["radarize"], AZIMUTHS)
     rng = np.random.default_rng(0)
     noise = rng.normal(size=(1, 96, 32, 12, 2)) / np.sqrt(2)
@@ -58,7 +58,7 @@ def test_no_flash_drowns_the_ridge():
 
 
 def test_maps_of_a_batch_are_made_once(tmp_path, monkeypatch):
-    """Those that were asked for, when they are first asked for."""
+    """Only requested maps are computed, on first access."""
     with Recording(walk(tmp_path / "a.h5")) as recording:
         adc = recording.adc(0, 4)
     signal, made, of = Signal(CONFIG), [], MapMaker.of
@@ -108,7 +108,7 @@ def test_stored_maps_equal_fresh_ones_and_truth_stays(tmp_path):
 
 
 def test_stored_maps_take_a_tenth(tmp_path):
-    """Of compressed samples, on noise and few echoes, which compress worst."""
+    """Size relative to compressed samples, for noise and few echoes, which compress worst."""
     config = PRESETS["radarize"]
     rng = np.random.default_rng(0)
     adc = rng.normal(0, 60, (8, *config.frame_shape)).astype(np.int16)

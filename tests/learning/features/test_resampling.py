@@ -1,4 +1,4 @@
-"""Maps of any chirp on the grid that networks know: what lies where, and what is not seen."""
+"""Maps of any chirp on the grid of networks: positions, and rows that the radar does not cover."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def grid(rows: int, step: float) -> MapGrid:
 @pytest.mark.parametrize("own", [grid(60, 0.5), grid(60, 1.0), grid(90, 1.7), grid(400, 0.13)])
 @pytest.mark.parametrize("centred", [False, True])
 def test_rows_are_means_of_what_is_near(own, centred):
-    """Against loops, in float64; where the radar sees nothing, the quietest row of the column."""
+    """Compared with loops in float64; rows that the radar does not cover have the minimum of their column."""
     known = grid(40, 1.0)
     power = np.random.default_rng(0).gamma(2.0, size=(own.rows, 3))
     found = Resampling(known, own, centred)(torch.tensor(10 * np.log10(power)).float()[None, None])[0, 0]
@@ -53,7 +53,7 @@ def test_the_same_rows_are_left_alone():
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_an_echo_is_in_the_same_cell_for_every_radar(name):
-    """A point 2.4 m away, 20 deg to the left, that the radar walks towards at 0.8 m/s, in each of a radar's maps."""
+    """A point at 2.4 m, 20 deg to the left, that the radar approaches at 0.8 m/s, in each map of a radar."""
     azimuth, distance, speed = np.radians(20), 2.4, 0.8
     point = np.array([[distance * np.cos(azimuth), distance * np.sin(azimuth), 0.0]])
     cells = {}
@@ -99,7 +99,7 @@ def test_what_a_radar_lacks():
 
 @pytest.mark.parametrize("own", [grid(60, 1.0), grid(30, 1.9), grid(90, 0.6), grid(200, 0.31)])
 def test_labels_of_another_radar(own):
-    """Against loops: each cell is the nearest's, and every surface is there, once its place is."""
+    """Compared with loops: each cell is the nearest one's, and every surface within the range is kept."""
     known = grid(40, 1.0)
     rng = np.random.default_rng(0)
     first = rng.integers(0, own.rows, 50)

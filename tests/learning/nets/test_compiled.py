@@ -1,4 +1,4 @@
-"""Graphs that come with the package: that they say what the networks say, whatever the weights."""
+"""Graphs of the package: their output equals that of the networks, with any weights."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from radarize.pipeline.method import Weights
 
 
 def altered(kind: str) -> tuple[nn.Module, Header]:
-    """The shipped network with weights and statistics that it never had."""
+    """The shipped network with random weights and statistics."""
     net, header = load(Weights().of(kind), find_task(kind).network)
     torch.manual_seed(1)
     for values in net.state_dict().values():

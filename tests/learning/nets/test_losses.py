@@ -11,7 +11,7 @@ from radarize.signal.depthlabel import FREE, SURFACE, UNKNOWN
 
 
 def test_cyclic():
-    """Of the paper, up to the scale: (d - f(a, b))^2 + (-d - f(b, a))^2, at standard deviations of 1."""
+    """The paper's loss up to the scale: (d - f(a, b))^2 + (-d - f(b, a))^2, at standard deviations of 1."""
     both = Gaussian(torch.tensor([[0.3], [-0.1]]), torch.ones(2, 1, 1))
     d = 0.2
     assert cyclic(both, torch.tensor([[d]])).item() == pytest.approx(((d - 0.3) ** 2 + (-d + 0.1) ** 2) / 4)

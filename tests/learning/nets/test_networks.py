@@ -1,4 +1,4 @@
-"""The networks: sizes by formula, what they are blind to, and their normal distributions."""
+"""The networks: sizes by formula, invariances, and normal distributions."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def parameters(net: torch.nn.Module) -> int:
 
 
 def resnet_parameters(inputs: int, outputs: int, w: int) -> int:
-    """Convolutions have k^2 weights a pair of channels, batch normalisation two a channel."""
+    """Convolutions have k^2 weights per pair of channels, batch normalisation two per channel."""
     count = 49 * inputs * w + 2 * w
     for before, after in ((w, w), (w, 2 * w), (2 * w, 4 * w), (4 * w, 8 * w)):
         count += 9 * before * after + 3 * 9 * after * after + 4 * 2 * after
@@ -47,7 +47,7 @@ def test_resnet_of_the_paper_has_11_million_parameters():
 @pytest.mark.parametrize("axes", [1, 2])
 @pytest.mark.parametrize(("channels", "stride"), [(3, 1), (16, 2)])
 def test_a_shortcut_is_a_convolution_with_a_stride(axes, channels, stride):
-    """Though the one of few channels, in which oneDNN writes past its memory, has none itself."""
+    """Equal output, although blocks with few channels avoid the layer in which oneDNN writes past its memory."""
     block = Block(channels, 20, 2, axes).double().eval()
     x = torch.randn(2, channels, *(9, 12)[:axes], dtype=torch.float64)
     mix, norm = block.shortcut
@@ -74,7 +74,7 @@ def test_unet_keeps_any_size(rows, columns):
 
 @pytest.mark.parametrize("dimensions", [1, 2])
 def test_gaussian(dimensions):
-    """Against torch's own multivariate normal distribution."""
+    """Compared with torch's multivariate normal distribution."""
     torch.manual_seed(0)
     found = Gaussian.of(torch.randn(50, Gaussian.numbers(dimensions)), dimensions)
     truth = torch.randn(50, dimensions)
@@ -84,7 +84,7 @@ def test_gaussian(dimensions):
 
 
 def test_the_likelihood_finds_mean_and_covariance():
-    """Of samples of a known distribution, with and without the weighting."""
+    """Samples of a known distribution are fitted, with and without the weighting."""
     torch.manual_seed(0)
     factor = torch.tensor([[0.5, 0.0], [-0.3, 0.2]])
     truth = torch.randn(500, 2) @ factor.T + torch.tensor([1.0, -2.0])
@@ -112,8 +112,8 @@ def test_gain_does_not_matter(kind):
     torch.manual_seed(0)
     net = NETS[kind](2, ("a", "b"), 4).eval()
     maps = 10 * torch.randn(3, 2, 2, 32, 80)
-    told = (torch.zeros(3, 2),) if kind == "rotation" else ()
-    for a, b in zip(net.estimate(maps, *told), net.estimate(maps + 17, *told), strict=True):
+    travel = (torch.zeros(3, 2),) if kind == "rotation" else ()
+    for a, b in zip(net.estimate(maps, *travel), net.estimate(maps + 17, *travel), strict=True):
         assert torch.allclose(a, b, atol=1e-4)
 
 
@@ -128,7 +128,7 @@ def test_a_turn_back_is_the_turn_negated():
 
 
 def test_the_second_look_sees_the_ridge_flat_and_in_the_middle():
-    """Also of a velocity at which part of the ridge aliases."""
+    """Holds also for a velocity at which a part of the ridge aliases."""
     step, rows = 0.1146, 32
     net = TranslationNet(1, ("doppler_azimuth",), 4, step)
     for forward, left in ((0.7, -0.3), (1.75, 0.9), (-1.2, 0.0)):
@@ -143,7 +143,7 @@ def test_the_second_look_sees_the_ridge_flat_and_in_the_middle():
 
 
 def test_maps_from_a_step_away():
-    """A pole stands where it stands: against its place seen from there."""
+    """A point keeps its position in the world, compared with its position seen from there."""
     ranges = np.arange(96)[:, None] * 0.0446
 
     def pole(ahead: float, left: float) -> torch.Tensor:
@@ -159,7 +159,7 @@ def test_maps_from_a_step_away():
 
 
 def test_correlation_is_the_sum_of_products():
-    """Against loops over steps, shifts and cells; what is shifted out of the map counts for nothing."""
+    """Compared with loops over steps, shifts and cells; cells shifted out of the map do not count."""
     torch.manual_seed(0)
     layer = Correlation(1, 10, features=1, turns=3, steps=1)
     layer.features = torch.nn.Identity()

@@ -1,4 +1,4 @@
-"""Files of weights: what comes back, what is refused, and ONNX."""
+"""Files of weights: reading back, refused files, and ONNX."""
 
 import json
 import re
@@ -26,7 +26,7 @@ MAPS = {"translation": ("doppler_azimuth", "doppler_elevation_aware"), "rotation
 
 
 def network(kind: str, width: int = 4):
-    """One with weights and statistics that say something."""
+    """A network with weights and statistics that affect its output."""
     maps = MAPS.get(kind, ("range_azimuth", "elevation_aware"))
     header = Header(
         kind=kind, frames=2, maps=maps, width=width, grid=MapGrid.of(CONFIG, maps[0]), data="small", seed=3,
@@ -69,7 +69,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
     with pytest.raises(InputError, match="missing.safetensors: no such file"):
         load(tmp_path / "missing.safetensors", TranslationNet)
     (tmp_path / "text.safetensors").write_text("no weights at all")
-    with pytest.raises(InputError, match="text.safetensors: is no file of weights"):
+    with pytest.raises(InputError, match="text.safetensors: is not a file of weights"):
         load(tmp_path / "text.safetensors", TranslationNet)
     save_file({"a": torch.zeros(2)}, tmp_path / "other.safetensors")
     with pytest.raises(InputError, match="has no header of radarize"):
@@ -87,13 +87,13 @@ def test_what_does_not_fit_is_refused(tmp_path):
         assert "expected one for 'translation' (corrected)" in str(refused.value)
     with torch.no_grad():
         net.resnet.head.bias[0] = 1e6
-    with pytest.raises(InputError, match="resnet.head.bias has values that float16 does not hold"):
+    with pytest.raises(InputError, match="resnet.head.bias has values outside the range of float16"):
         save(net, header, path)
 
 
 @pytest.mark.parametrize("kind", NETS)
 def test_onnx_says_the_same(kind, tmp_path):
-    """By another run time, for any number of items."""
+    """Compared with another runtime, for any number of items."""
     pytest.importorskip("onnxscript", reason="the extra onnx is not installed")
     net, header = network(kind)
     path = export_onnx(net, header, tmp_path / "net.onnx")
@@ -109,7 +109,7 @@ def test_onnx_says_the_same(kind, tmp_path):
 
 
 def test_loading_imports_no_compiler():
-    """Nobody waits seconds for what torch imports to compile networks, or to draw numbers for the device "meta"."""
+    """Loading networks does not import torch's compiler, which takes seconds."""
     script = """
 import sys
 from radarize.pipeline.method import Weights
@@ -119,5 +119,5 @@ for network in (TranslationNet, RotationNet):
     load(Weights().of(network.kind), network)
 print("torch" in sys.modules, "torch._dynamo" in sys.modules)
 """
-    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-    assert said.split() == ["True", "False"]
+    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert output.split() == ["True", "False"]

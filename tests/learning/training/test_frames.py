@@ -21,7 +21,7 @@ HOW_TO = Path(__file__).parents[3] / "docs" / "howto" / "train.md"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Three recordings of samples, and a split of them."""
+    """Three recordings of samples, with a split."""
     folder = tmp_path_factory.mktemp("data")
     for k, name in enumerate("abc"):
         walk(folder / f"{name}.h5", seed=k)
@@ -32,7 +32,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def maps_folder(folder, tmp_path_factory):
-    """The same as heat maps."""
+    """The same recordings as heat maps."""
     kept = tmp_path_factory.mktemp("maps")
     for path in folder.glob("*.h5"):
         keep_maps(path, kept / path.name)
@@ -84,7 +84,7 @@ def test_recordings_by_name(folder):
 
 
 def test_time_is_exact(tmp_path):
-    """Of stamps since 1970, float32 has steps of two minutes."""
+    """float32 has steps of two minutes for stamps since 1970."""
     path = walk(tmp_path / "a.h5", start=1.7e9)
     item = FrameDataset(path, fields=("time", "velocity"), window=4)[2]
     with Recording(path) as recording:
@@ -105,7 +105,7 @@ def test_cached_maps_are_made_once_and_the_same(folder, monkeypatch):
 
 
 def test_one_definition_of_a_map(folder):
-    """What the data set, the networks and `rz.doppler_azimuth` call a Doppler-azimuth map is one, axes included."""
+    """The Doppler-azimuth map of the data set, of networks and of `rz.doppler_azimuth` is the same, axes included."""
     import radarize as rz
     from radarize.signal.maps import AZIMUTHS, FLOOR
 
@@ -130,7 +130,7 @@ def test_splits(folder):
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_worker_processes(maps_folder, method):
-    """After the parent has read, too: what it has open is not for its children."""
+    """Works after the parent has read too: children do not use its open files."""
     frames = FrameDataset(maps_folder, fields=("range_azimuth", "turn"), stride=2)
     alone = [frames[k] for k in range(len(frames))]
     loader = DataLoader(frames, batch_size=4, num_workers=2, multiprocessing_context=method)
@@ -174,7 +174,7 @@ def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
 
 
 def test_the_example_of_the_readme_trains(folder, monkeypatch, capsys):
-    """As printed, on these recordings: the loss falls."""
+    """The example as printed runs on these recordings, and the loss falls."""
     code = next(c for c in re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), re.S) if "torch_dataset(" in c)
     assert len([line for line in code.splitlines() if line.strip()]) <= 12
     torch.manual_seed(0)

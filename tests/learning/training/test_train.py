@@ -1,4 +1,4 @@
-"""Training: that networks learn the laws their maps are drawn by, and what interrupts, teams and bad input do to it."""
+"""Training: networks learn the laws of synthetic maps; interrupts, several processes, and bad input."""
 
 import csv
 import os
@@ -89,21 +89,21 @@ def test_networks_learn(kind, tmp_path):
 
 
 def test_uncertainty_follows_what_is_seen(tmp_path):
-    """Of maps that show nothing but noise, the network claims what is known without them."""
-    for k in range(4):  # mostly blank: one factor calibrates all claims
+    """For maps with noise only, the network estimates the covariance of the labels."""
+    for k in range(4):  # mostly blank: one factor calibrates all covariances
         write(tmp_path / "data" / f"{k}.h5", "velocity", 100, k, blank=0.6)
     settings = replace(QUICK["translation"], epochs=12)
     weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
     net, header = load(weights, TASKS["translation"].network)
-    claimed = []
+    deviations = []
     for blank in (0, 1):
         path = write(tmp_path / f"{blank}.h5", "velocity", 100, 9, blank)
         table = FeatureTable.read([path], header.maps, (VELOCITY,))
         with torch.no_grad():
             covariance = net.estimate(table.window(table.starts(1)[:, None]))[1]
-        claimed.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
-    assert (claimed[1] > 1.3 * claimed[0]).all()
-    assert claimed[1] == pytest.approx([1.2 / 3**0.5, 0.8 / 3**0.5], rel=0.4)  # of uniform distributions
+        deviations.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
+    assert (deviations[1] > 1.3 * deviations[0]).all()
+    assert deviations[1] == pytest.approx([1.2 / 3**0.5, 0.8 / 3**0.5], rel=0.4)  # of uniform distributions
 
 
 def same(a: Path, b: Path) -> bool:
@@ -113,7 +113,7 @@ def same(a: Path, b: Path) -> bool:
 
 
 def test_resumed_is_uninterrupted(small, tmp_path):
-    """Killed without warning after two epochs and a bit, then started anew with --resume."""
+    """Killed during the third epoch, then restarted with --resume."""
     whole = train("translation", small, tmp_path / "whole.safetensors", settings=TINY)
     code = f"""
 import os, torch
@@ -128,7 +128,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == -9, done.stderr
     assert sorted(path.name for path in tmp_path.glob("part.*")) == ["part.checkpoint", "part.csv"]
-    with pytest.raises(InputError, match="part.checkpoint: is left of a training that did not end; --resume goes on"):
+    with pytest.raises(InputError, match="part.checkpoint: belongs to an interrupted training; .* --resume"):
         train("translation", small, tmp_path / "part.safetensors", settings=TINY)
     with pytest.raises(InputError, match="is of a training with seed 0, expected 1"):
         train(
@@ -138,23 +138,23 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
             settings=replace(TINY, seed=1),
             options=TrainOptions(resume=True),
         )
-    said = []
+    lines = []
     resumed = train(
         "translation",
         small,
         tmp_path / "part.safetensors",
         settings=TINY,
         options=TrainOptions(resume=True),
-        say=said.append,
+        log=lines.append,
     )
-    assert said[0] == "resuming after epoch 2"
+    assert lines[0] == "resuming after epoch 2"
     assert same(whole, resumed)
     assert header_of(whole).metrics == header_of(resumed).metrics
     assert not same(whole, train("translation", small, tmp_path / "c.safetensors", settings=replace(TINY, seed=1)))
 
 
 def test_two_processes(small, tmp_path):
-    """By torch's launcher: both end with the same weights, and the loss falls."""
+    """Two processes of torch's launcher end with the same weights, and the loss falls."""
     code = f"""
 import hashlib, os
 from dataclasses import replace
@@ -192,9 +192,9 @@ def test_it_ends_when_it_gets_no_better(small, tmp_path, monkeypatch):
     assert header_of(weights).epochs == 3
 
 
-def test_a_loss_that_is_no_number_is_said(small, tmp_path, monkeypatch):
-    honest = losses.likelihood
-    monkeypatch.setattr(losses, "likelihood", lambda found, truth: honest(found, truth) * float("nan"))
+def test_a_loss_that_is_not_finite_is_an_error(small, tmp_path, monkeypatch):
+    finite = losses.likelihood
+    monkeypatch.setattr(losses, "likelihood", lambda found, truth: finite(found, truth) * float("nan"))
     with pytest.raises(InputError, match="the loss is nan in epoch 1, step 1: it diverged, expected a smaller --rate"):
         train("translation", small, tmp_path / "net.safetensors", settings=TINY)
 
@@ -271,12 +271,12 @@ def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
 
     with h5py.File(good, "r+") as file:
         file["truth/velocity"][:] = np.nan
-    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or holds no numbers"):
+    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or has no numbers"):
         FeatureTable.read([good], ("doppler_azimuth",), (VELOCITY,))
 
 
 def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
-    """As where a tracking camera was blind, or an IMU stalled."""
+    """As when a tracking camera loses tracking, or an IMU stalls."""
     import h5py
 
     paths = [write(tmp_path / name, "velocity", 8) for name in ("a.h5", "b.h5")]
@@ -301,7 +301,7 @@ OTHER = CONFIG.model_copy(update={"loops": 24, "samples": 32})
 
 
 def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
-    """As networks are shown them; frames of the radar that has the grid stay as they are."""
+    """Maps are resampled as in operation; those of a radar with the network's grid are unchanged."""
     paths = [write(tmp_path / "a.h5", "velocity", 5), write(tmp_path / "b.h5", "velocity", 6, config=OTHER)]
     grid = MapGrid.of(CONFIG, "doppler_azimuth")
     table = FeatureTable.read(paths, ("doppler_azimuth",), (VELOCITY,), grid=grid)
@@ -314,7 +314,7 @@ def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
 
 
 def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
-    """What the first has learned, the second goes on with: with no time to learn, it is as good."""
+    """A training continues from the weights of another: without further steps it is equally good."""
     first = train("translation", small, tmp_path / "first.safetensors", QUICK["translation"])
     mixed = tmp_path / "mixed"
     mixed.mkdir()

@@ -1,4 +1,4 @@
-"""A walk past points with known positions, by a board with known errors, summed by brute force (`tests.echoes`)."""
+"""A walk past points with known positions, with a board of known errors, summed by brute force (`tests.echoes`)."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ LEVER, YAW, HEIGHT = 0.25, np.radians(4.0), 1.0
 
 
 class Spoiled(NamedTuple):
-    """A recording, and what is wrong with its board."""
+    """A recording, and the errors of its board."""
 
     recording: Recording
     factors: np.ndarray
@@ -30,7 +30,7 @@ def errors(seed: int) -> tuple[np.ndarray, float]:
 
 
 def spoil(adc: np.ndarray, config: RadarConfig, factors: np.ndarray, bias: float) -> np.ndarray:
-    """Samples as a board with channel errors and a range bias makes them."""
+    """Samples of a board with channel errors and a range bias."""
     times = (np.arange(config.samples) - (config.samples - 1) / 2) / config.sample_rate
     shift = np.exp(4j * np.pi * config.slope * bias / SPEED_OF_LIGHT * times)
     signal = (adc[..., 0] + 1j * adc[..., 1]) * factors[..., None] * shift

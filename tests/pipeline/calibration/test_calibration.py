@@ -1,4 +1,4 @@
-"""Calibration against a brute-force reference: points that a board with known errors passes by."""
+"""Calibration compared with a brute-force reference: a board with known errors passes points."""
 
 import subprocess
 import sys
@@ -24,7 +24,7 @@ def found(spoiled):
 
 
 def test_channels_are_found_by_walking(spoiled, found):
-    """Slopes of the phase along the array included, which plane waves alone leave open."""
+    """Includes slopes of the phase along the array, which plane waves alone do not determine."""
     leftover = (found.config.calibration * spoiled.factors).ravel()
     assert np.degrees(centred(leftover).std()) < 1.5
     assert (20 * np.log10(np.abs(leftover))).std() < 0.1
@@ -64,7 +64,7 @@ def test_a_boards_file_takes_the_errors_off(spoiled, found, tmp_path):
 
 
 def test_a_cfg_holds_factors_that_the_firmware_takes(found, tmp_path):
-    """16-bit fractions: no factor exceeds 1; ratios stay."""
+    """Factors are 16-bit fractions: none exceeds 1, and ratios are kept."""
     text = found.save(tmp_path / "radar.cfg").read_text()
     config = parse_cfg(text)
     assert np.abs(config.channel_factors).max() == pytest.approx(1, abs=1e-5)
@@ -75,7 +75,7 @@ def test_a_cfg_holds_factors_that_the_firmware_takes(found, tmp_path):
 
 
 def test_odometry_with_the_board(spoiled, found, tmp_path):
-    """Velocities come right, in both directions."""
+    """Velocities with the calibration are correct, in both directions."""
     board = found.save(tmp_path / "board.yaml")
     off = []
     for given in (None, str(board)):
@@ -109,7 +109,7 @@ def test_a_corner_reflector(tmp_path, distance):
     assert np.degrees(centred(leftover).std()) < 0.1  # the wave is a sphere: 0.6 deg at 1.3 m
     assert (20 * np.log10(np.abs(leftover))).std() < 0.02
     assert found.values["range_bias"].value == pytest.approx(bias, abs=0.005)
-    with pytest.raises(InputError, match="no echo stands out within 0.5 m about 3.6 m"):
+    with pytest.raises(InputError, match="no strong echo is within 0.5 m of 3.6 m"):
         rz.calibrate(path, target=3.6)
     with pytest.raises(InputError, match=r"--target is 9 m, expected between 0.3 and 4.28 m"):
         rz.calibrate(path, target=9.0)
@@ -118,12 +118,12 @@ def test_a_corner_reflector(tmp_path, distance):
 def test_too_short_a_walk_shows_nothing(spoiled):
     with pytest.raises(InputError, match="expected a walk of about 20 s"):
         rz.calibrate(spoiled.recording[:20])
-    with Recording(spoiled.recording.path) as opened, pytest.raises(InputError, match="move|stands out"):
+    with Recording(spoiled.recording.path) as opened, pytest.raises(InputError, match="move|no strong echo"):
         rz.calibrate(opened, target=2.0)
 
 
 def test_every_second_frame(spoiled):
-    """Half the frame rate: tracks and turns are those of the frames that are used."""
+    """With half the frame rate, tracks and turns are those of the frames used."""
     found = rz.calibrate(spoiled.recording[::2])
     leftover = (found.config.calibration * spoiled.factors).ravel()
     assert np.degrees(centred(leftover).std()) < 2
@@ -132,12 +132,12 @@ def test_every_second_frame(spoiled):
 
 
 def test_another_output_is_refused(found, tmp_path):
-    with pytest.raises(InputError, match="expected a board's file"):
+    with pytest.raises(InputError, match="expected a board file"):
         found.save(tmp_path / "board.txt")
 
 
 def test_what_trains_reads_recordings_with_the_board(spoiled, found, tmp_path, monkeypatch):
-    """Maps of the calibrated board, in whatever process reads them."""
+    """All processes that read recordings use the calibrated board."""
     written = found.save(tmp_path / "board.yaml")
     monkeypatch.setenv("RADARIZE_BOARD", str(written))
     with Recording(spoiled.recording.path) as opened:
@@ -146,7 +146,7 @@ def test_what_trains_reads_recordings_with_the_board(spoiled, found, tmp_path, m
 
 
 def test_commands(spoiled, tmp_path):
-    """The file that one command writes, another takes; a useless recording ends in one sentence, and exit code 2."""
+    """One command writes the file that another reads; an unusable recording ends in one sentence and exit code 2."""
 
     def radarize(*arguments: object) -> subprocess.CompletedProcess:
         command = [sys.executable, "-m", "radarize.cli", *map(str, arguments)]

@@ -17,7 +17,7 @@ FRAMES, EACH = 150, 40
 
 
 def world(seed: int, tilt: float = 0.0, scale: float = 0.0) -> tuple[Cells, np.ndarray]:
-    """Cells of a walk, and their directions: walls at the horizon, and things anywhere; a few move."""
+    """Cells of a walk, and their directions: walls at the horizon, and objects anywhere; some move."""
     rng = np.random.default_rng(seed)
     count = FRAMES * EACH
     frame = np.repeat(np.arange(FRAMES), EACH)
@@ -66,7 +66,7 @@ def test_a_slope_is_a_shift_of_directions():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_motion_tells_shifts_tilt_and_scale(seed):
-    """Both signs of all of them."""
+    """All values are found with both signs."""
     sign = (-1) ** seed
     shift, tilt, scale = sign * np.array([0.02, -0.04]), sign * np.radians(3.0), sign * 0.02
     cells, directions = world(seed, tilt, scale)
@@ -83,7 +83,7 @@ def test_motion_tells_shifts_tilt_and_scale(seed):
 
 
 def test_an_array_without_elevation():
-    """Two transmitters: a row of eight; nothing is said of heights."""
+    """Two transmitters: a row of eight, which does not determine elevations."""
     flat = PRESETS["two-tx"]
     array = Array(flat)
     assert array.axes == [0]

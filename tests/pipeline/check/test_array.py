@@ -1,4 +1,4 @@
-"""Arrays that a radar's may be mistaken for, of any number of antennas."""
+"""Candidate arrays of a check, for any number of antennas."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Faults put into a simulated walk, one after the other: found, named, and mended where they can be."""
+"""Faults put into a simulated walk, one after the other: found, named, and corrected where they can be."""
 
 import json
 
@@ -29,10 +29,10 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording, RecordingWriter
 from radarize.odometry.inertial import Imu
 from radarize.pipeline.check.check import check, check_evidence, warnings_before
+from radarize.pipeline.check.correction import write_corrected
 from radarize.pipeline.check.evidence import Evidence
 from radarize.pipeline.check.faults import TESTS
-from radarize.pipeline.check.finding import Finding, Mending
-from radarize.pipeline.check.mending import write_mended
+from radarize.pipeline.check.finding import Correction, Finding
 from radarize.radar.boards import load_board
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
@@ -81,7 +81,7 @@ def test_each_kind_is_put_in_somewhere():
     assert kinds - {fault.kind for fault in FAULTS.values()} <= {"transmitter copied"}
 
 
-def test_a_finding_says_what_was_measured_and_what_mends_it(whole):
+def test_a_finding_has_measurement_and_remedy(whole):
     (found,) = check_evidence(harmed(whole, exchanged_iq).evidence).findings
     assert found.sure > 0.9 and "dB stronger" in found.measured and "--iq-order iiqq" in found.remedy
 
@@ -101,14 +101,14 @@ def test_a_standing_radar_is_not_judged_by_its_motion(whole):
     ],
 )  # fmt: skip
 def test_fix_gives_the_samples_back(whole, harm, tmp_path):
-    """Byte by byte, with configuration and stamps; and nothing is found in what was mended."""
+    """Samples, configuration and stamps are restored byte by byte, and the corrected recording has no finding."""
     source = write(harmed(whole, harm), tmp_path / "wrong.h5")
     assert not check(source, tmp_path / "right.h5").well
     with Recording(tmp_path / "right.h5") as right:
         np.testing.assert_array_equal(right.adc(0, len(right)), whole.adc)
         assert right.config == whole.config
         np.testing.assert_allclose(right.times, whole.times)
-        assert "mended by radarize check" in str(right.attributes["warnings"])
+        assert "corrected by radarize check" in str(right.attributes["warnings"])
     assert check(tmp_path / "right.h5").well
 
 
@@ -122,10 +122,10 @@ def test_repeated_frames_are_left_out(whole, tmp_path):
 
 
 def test_streams_come_along(path, whole, tmp_path):
-    """An IMU as it was, and poses; rows of frames with their frames."""
+    """IMU and poses are unchanged; rows of frames move with their frames."""
     with Recording(path) as source:
-        mending = Mending(order=np.arange(len(source))[::-1], keeps_stamps=True)
-        write_mended(source[:], (Finding("x", "y", 1.0, "z", mending),), tmp_path / "right.h5")
+        correction = Correction(order=np.arange(len(source))[::-1], keeps_stamps=True)
+        write_corrected(source[:], (Finding("x", "y", 1.0, "z", correction),), tmp_path / "right.h5")
         with Recording(tmp_path / "right.h5") as right:
             np.testing.assert_array_equal(right.read("imu/gyroscope"), source.read("imu/gyroscope"))
             assert {*right.names()} == {*source.names()} - {n for n in source.names() if n.startswith("points/")}
@@ -137,20 +137,20 @@ def test_streams_come_along(path, whole, tmp_path):
 
 
 def test_the_right_board_is_written(whole, tmp_path):
-    """Left and right exchanged in a board's file, as an IMU sees: the mended file has them the right way."""
-    from radarize.pipeline.check.mending import _write_board
+    """Left and right are exchanged in a board file, which an IMU shows; the corrected file has them in order."""
+    from radarize.pipeline.check.correction import _write_board
 
     wrong = harmed(whole, mirrored)
     (found,) = check_evidence(wrong.evidence).findings
-    mended = wrong.evidence.mended(found.mending)
+    corrected = wrong.evidence.corrected(found.correction)
     with Recording(write(wrong, tmp_path / "wrong.h5")) as recording:
-        _write_board(recording[:], mended, tmp_path / "board.yaml")
+        _write_board(recording[:], corrected, tmp_path / "board.yaml")
     board = load_board(tmp_path / "board.yaml")
     assert board.tx == load_board(whole.config.board).tx and board.rx == load_board(whole.config.board).rx
     assert yaml.safe_load((tmp_path / "board.yaml").read_text())["chip"] == "iwr1843"
 
 
-def test_nothing_to_mend_is_said(path, tmp_path):
+def test_nothing_to_correct_is_reported(path, tmp_path):
     with pytest.raises(InputError, match="no fault was found"):
         check(path, tmp_path / "right.h5")
     assert not list(tmp_path.iterdir())
@@ -167,9 +167,9 @@ def test_the_command(path, whole, tmp_path, capsys):
     assert "no fault found" in capsys.readouterr().out
     wrong = write(harmed(whole, transmitters(0, 2, 1)), tmp_path / "wrong.h5")
     assert called("check", wrong, "--json", "--fix", tmp_path / "right.h5") == 1
-    told = json.loads(capsys.readouterr().out)
-    assert [each["kind"] for each in told["findings"]] == ["transmitter order"] and not told["well"]
-    assert "azimuth mirrored" in told["not_observable"]
+    printed = json.loads(capsys.readouterr().out)
+    assert [each["kind"] for each in printed["findings"]] == ["transmitter order"] and not printed["well"]
+    assert "azimuth mirrored" in printed["not_observable"]
     assert called("check", tmp_path / "right.h5") == 0
     assert called("check", tmp_path / "missing.h5") == 2
 
@@ -178,8 +178,8 @@ def test_run_warns_and_does_not_change(whole, tmp_path, capsys):
     part = whole.of(np.arange(60, 120))
     wrong = write(harmed(part, exchanged_iq), tmp_path / "wrong.h5")
     assert called("run", wrong, "-o", tmp_path / "run", "--odometry", "doppler", "--scans", "first-echo") == 0
-    told = capsys.readouterr().err
-    assert told.count("I and Q: leakage at negative range") == 1
+    printed = capsys.readouterr().err
+    assert printed.count("I and Q: leakage at negative range") == 1
     assert any("I and Q" in words for words in rz.Run(tmp_path / "run").warnings)
     with Recording(wrong) as recording:
         assert warnings_before(recording[::2]) == warnings_before(recording[:])
@@ -213,7 +213,7 @@ def test_lost_frames_are_no_frozen_ones(whole):
 
 
 def test_public_captures(recordings, tmp_path):
-    """One frame each, of radars at rest: that the radar stands is all that may be found."""
+    """One frame each, of radars at rest: the only finding allowed is that the radar does not move."""
     from tests.io.importers.public import captures
 
     for capture in captures(recordings, tmp_path).values():

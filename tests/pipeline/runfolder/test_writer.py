@@ -1,4 +1,4 @@
-"""Run folders: whole or not at all, and the same when read."""
+"""Run folders: complete or absent, and read back as written."""
 
 import gc
 import json
@@ -22,7 +22,7 @@ RNG, RADAR = np.random.default_rng(0), PRESETS["radarize"]
 
 
 def result(first, count):
-    """Frames of a walk ahead, 30 a second; nothing is seen of every other."""
+    """Frames of forward motion at 30 Hz; every second one has no echo."""
     frames = first + np.arange(count)
     step = np.tile([0.02, 0.0, 0.01], (count, 1))
     track = SimpleNamespace(
@@ -73,7 +73,7 @@ def test_what_is_written_is_read(tmp_path):
     assert times == pytest.approx(run.scans["time"]) and poses[:, 0] == pytest.approx(0.02 * run.scans["frames"])
     assert len(run.trajectory[0]) == 61 and run.reference is None and run.map.occupied.any() and run.metrics == {}
     assert run.facts["nodes"] > 1 and run.methods == {"odometry": "doppler", "scans": "first-echo"}
-    assert [span.why for span in writer.health.blindness.found.spans] == ["frames lost", "no velocity"]
+    assert [span.why for span in writer.health.observability.found.spans] == ["frames lost", "no velocity"]
     assert {path.name for path in run.path.iterdir()} == {
         "trajectory.tum", "odometry.tum", "map.pgm", "map.yaml", "scans.h5", "run.json",
     }  # fmt: skip

@@ -78,7 +78,7 @@ def test_obj_groups_and_materials(tmp_path):
 
 @pytest.mark.parametrize("quads", [False, True])
 def test_ply_with_object_numbers(tmp_path, quads):
-    """Replica's semantic mesh: an object number for each face, class names in a file beside."""
+    """Replica's semantic mesh: an object number per face, class names in a file beside it."""
     corners = [(0, 0, 0), (4, 0, 0), (4, 3, 0), (0, 3, 0), (4, 0, 3), (0, 0, 3)]
     faces = [(4, 0, 1, 2, 3), (4, 0, 1, 4, 5)] if quads else [(3, 0, 1, 2), (3, 0, 2, 3), (3, 0, 1, 4), (3, 0, 4, 5)]
     numbers = [7, 9] if quads else [7, 7, 9, 9]
@@ -100,7 +100,7 @@ def test_ply_with_object_numbers(tmp_path, quads):
 
 
 def test_stl_in_millimetres(tmp_path):
-    """Triangles come apart in STL, and units go unsaid."""
+    """STL separates triangles and has no units."""
     mesh = shapes.joined(*walls().values())
     mesh.apply_translation([0, 0, 1.0])
     mesh.apply_scale(1000)
@@ -124,7 +124,7 @@ def test_units(tmp_path, unit, metres):
 
 
 def test_cleaning(tmp_path):
-    """Repeated and degenerate triangles go, corners merge, and an edge of three triangles is reported."""
+    """Repeated and degenerate triangles are removed, corners merged, and an edge of three triangles is reported."""
     corners = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 2], [4, 0, 1e-7]], float)
     faces = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [0, 5, 2], [0, 1, 5], [0, 2, 4], [1, 1, 2]]
     trimesh.Trimesh(corners, faces, process=False).export(tmp_path / "a.ply")
@@ -150,7 +150,7 @@ def scan(noise: float, rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def test_a_noisy_scan_gets_flat_walls(tmp_path):
-    """5 mm of noise leave no plane; after import each wall is one, where it was, and decimation keeps it."""
+    """With 5 mm of noise there is no plane; after import each wall is one, at its position, and decimation keeps it."""
     rough = scan(0.005, np.random.default_rng(0))
     assert max(rough.area_faces[faces].sum() for faces in regions(rough)) < 0.3
     rough.export(tmp_path / "scan.ply")
@@ -209,7 +209,7 @@ TRIANGLE = "v 0 0 0\nv 4 0 0\nv 0 4 0\nf 1 2 3\n"
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "options", "complaint"),
+    ("name", "text", "options", "message"),
     [
         ("gone.glb", None, {}, "gone.glb: no such file"),
         ("nan.ply", NAN, {}, "part 'nan' has 1 corners that are no finite numbers"),
@@ -233,13 +233,13 @@ TRIANGLE = "v 0 0 0\nv 4 0 0\nv 0 4 0\nf 1 2 3\n"
         ("a.obj", TRIANGLE, {"materials": "'*': ["}, "map.yaml: malformed YAML"),
     ],
 )
-def test_mistakes_get_one_sentence(tmp_path, name, text, options, complaint):
+def test_mistakes_get_one_sentence(tmp_path, name, text, options, message):
     if text is not None:
         (tmp_path / name).write_text(text)
     if "materials" in options:
         (tmp_path / "map.yaml").write_text(options["materials"])
         options = {"materials": tmp_path / "map.yaml"}
-    with pytest.raises(InputError, match=complaint) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         import_scene(tmp_path / name, tmp_path / "out", Options(**options))
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
 

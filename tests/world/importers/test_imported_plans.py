@@ -156,7 +156,7 @@ def test_robot_laser_messages(tmp_path):
 
 @pytest.mark.skipif(not RADISH.is_dir(), reason="needs ../shared/recordings/radish")
 def test_the_intel_lab(tmp_path):
-    """Part of a real building: what its lidar saw lies on few straight walls, and one can walk there."""
+    """Part of a real building: its lidar points lie on few straight walls, and its rooms are accessible."""
     log = gzip.decompress((RADISH / "intel-corrected.log.gz").read_bytes()).decode()
     lines = [line for line in log.splitlines() if line.startswith("FLASER")][:260]
     (tmp_path / "intel.log").write_text("\n".join(lines))
@@ -195,7 +195,7 @@ def test_scans_with_their_truth(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "complaint"),
+    ("name", "text", "message"),
     [
         ("a.log", "ODOM 0 0 0\n", "holds no FLASER or ROBOTLASER1 line"),
         ("a.log", "FLASER 3 1 2 3 0 0\n", "line 1 is no complete FLASER"),
@@ -215,9 +215,9 @@ def test_scans_with_their_truth(tmp_path):
         ("plan.yaml", "objects: []", "unknown format"),
     ],
 )
-def test_mistakes_get_one_sentence(tmp_path, name, text, complaint):
+def test_mistakes_get_one_sentence(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
-    with pytest.raises(InputError, match=complaint) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         import_scene(tmp_path / name, tmp_path / "out")
     assert "\n" not in str(caught.value)
 

@@ -1,4 +1,4 @@
-"""Rooms are told from solids, and up from sideways, whatever a file's faces and axes are."""
+"""Rooms are distinguished from solids, and the up axis is found, whatever a file's faces and axes are."""
 
 import numpy as np
 import pytest
@@ -28,17 +28,17 @@ def inside_out(mesh):
 
 
 def brought(tmp_path, *meshes, **options):
-    """Meshes imported from one PLY file."""
+    """Import meshes from one PLY file."""
     shapes.joined(*meshes).export(tmp_path / "place.ply")
     return import_scene(tmp_path / "place.ply", tmp_path / "out", Options(**options))
 
 
 @pytest.mark.parametrize("inwards", [False, True])
 def test_a_closed_box_is_a_room(tmp_path, inwards):
-    """One can walk in it, and its wall echoes as an endless plane of concrete does."""
+    """It is accessible, and its wall echoes like an infinite plane of concrete."""
     done = brought(tmp_path, inside_out(ROOM) if inwards else ROOM)
     assert [row.material for row in done.rows] == ["concrete"]
-    assert any("taken for a room" in remark for remark in done.remarks) != inwards
+    assert any("treated as a room" in remark for remark in done.remarks) != inwards
     scene = Scene.load(done.path)
     motion = plan_motion(scene, "handheld", 3.0, np.random.default_rng(0))
     assert isinstance(motion, Motion)
@@ -75,7 +75,7 @@ def test_solids_stay_solid(tmp_path):
 
 
 def lying(mesh, up):
-    """A mesh with z up as a file with another axis up has it."""
+    """Mesh with z up converted to a file's other up axis."""
     return mesh if up == "z" else trimesh.Trimesh(mesh.vertices[:, [0, 2, 1]] * [1, 1, -1], mesh.faces, process=False)
 
 
@@ -89,11 +89,11 @@ def lying(mesh, up):
         (shapes.box((1, 1, 1.35), (6, 2.6, 2.7), without=("+y", "-y")), "alone has a floor"),
     ],
 )
-def test_the_mesh_says_which_way_is_up(tmp_path, suffix, up, place, why):
+def test_up_is_estimated_from_the_mesh(tmp_path, suffix, up, place, why):
     lying(place, up).export(tmp_path / f"place.{suffix}")
     done = import_scene(tmp_path / f"place.{suffix}", tmp_path / "out", Options(units="m"))
     assert np.ptp(Scene.load(done.path).bounds, axis=0) == pytest.approx(np.ptp(place.bounds, axis=0), abs=1e-5)
-    assert any(f"{up} is taken for up" in remark and why in remark for remark in done.remarks)
+    assert any(f"{up} is taken as up" in remark and why in remark for remark in done.remarks)
     other = import_scene(
         tmp_path / f"place.{suffix}", tmp_path / "other", Options(units="m", up="z" if up == "y" else "y")
     )
@@ -101,24 +101,24 @@ def test_the_mesh_says_which_way_is_up(tmp_path, suffix, up, place, why):
     assert size == pytest.approx(np.ptp(place.bounds, axis=0)[[0, 2, 1]], abs=1e-5)
 
 
-def test_where_the_mesh_says_nothing_the_format_does(tmp_path):
+def test_where_the_mesh_is_not_conclusive_the_format_decides(tmp_path):
     cube = shapes.box((0, 0, 0), (5, 3, 3))
     for suffix, up in (("obj", "z"), ("glb", "y")):
         cube.export(tmp_path / f"cube.{suffix}")
         remarks = import_scene(tmp_path / f"cube.{suffix}", tmp_path / suffix).remarks
-        assert any(f"{up} is taken for up (usual" in remark for remark in remarks)
+        assert any(f"{up} is taken as up (usual" in remark for remark in remarks)
 
 
 def test_a_scene_without_echoes_is_refused(tmp_path, capsys):
-    """A block of concrete from within, in one sentence."""
+    """A radar inside a block of concrete gives an error message."""
     ROOM.export(tmp_path / "block.ply")
     (tmp_path / "block.yaml").write_text("objects: [{name: block, shape: mesh, file: block.ply, material: concrete}]\n")
     line = ["simulate", str(tmp_path / "block.yaml"), "-o", str(tmp_path / "a.h5"), "--duration", "1"]
     with pytest.raises(SystemExit) as exit_:
         run(app, "radarsim", line)
     assert exit_.value.code == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert "block: no frame has an echo, expected surfaces" in said and not (tmp_path / "a.h5").exists()
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "block: no frame has an echo, expected surfaces" in printed and not (tmp_path / "a.h5").exists()
 
 
 def walls_of_a_room():
@@ -132,11 +132,11 @@ def walls_of_a_room():
 
 @pytest.mark.parametrize("table", [False, True])
 def test_a_room_without_a_floor_gets_one(tmp_path, table):
-    """It stays where it is, and one walks in it, not on its roof."""
+    """It stays at its position, and a walk is inside it, not on its roof."""
     meshes = [walls_of_a_room(), shapes.box((3, 2, 2.65), (6.2, 4.2, 0.1))]
     done = brought(tmp_path, *meshes, *([shapes.box((1, 1, 0.75), (1.2, 0.6, 0.05))] if table else []))
     assert not any("moved by" in remark for remark in done.remarks)
-    assert any("has a ceiling 2." in remark and "no floor: one is put there" in remark for remark in done.remarks)
+    assert any("has a ceiling 2." in remark and "no floor: a floor is added" in remark for remark in done.remarks)
     scene = Scene.load(done.path)
     assert ground_level(scene) == 0 and scene.bounds[1, 2] == pytest.approx(2.7)
     motion = plan_motion(scene, "handheld", 3.0, np.random.default_rng(0))

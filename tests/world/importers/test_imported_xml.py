@@ -27,7 +27,7 @@ def shipped(name: str) -> Path:
     ],
 )
 def test_sionna_scenes(tmp_path, name, materials):
-    """Same extent, shapes and materials as Sionna RT itself loads."""
+    """Same extent, shapes and materials as loaded by Sionna RT."""
     import sionna.rt
 
     done = import_scene(shipped(name), tmp_path, Options(floor=False))
@@ -45,7 +45,7 @@ def test_sionna_scenes(tmp_path, name, materials):
 def test_a_city_stays_in_metres(tmp_path):
     done = import_scene(shipped("munich"), tmp_path)
     assert len(done.rows) > 2000
-    assert any("1.48e+03 m long, which is odd" in remark for remark in done.remarks)
+    assert any("1.48e+03 m long, unusual" in remark for remark in done.remarks)
 
 
 XML = """<scene version="2.1.0"><default name="wide" value="2"/>
@@ -90,7 +90,7 @@ CUBE = '<shape type="cube" id="c">{}</shape>'
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("text", "message"),
     [
         ("<scene><shape", "is not readable XML"),
         ("<html/>", "its root is <html>, expected <scene>"),
@@ -105,8 +105,8 @@ CUBE = '<shape type="cube" id="c">{}</shape>'
         ("<scene>" + CUBE.format('<transform><scale value="x"/></transform>') + "</scene>", "shape 'c': .*'x'"),
     ],
 )  # fmt: skip
-def test_mistakes_get_one_sentence(tmp_path, text, complaint):
+def test_mistakes_get_one_sentence(tmp_path, text, message):
     (tmp_path / "a.xml").write_text(text)
-    with pytest.raises(InputError, match=complaint) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         import_scene(tmp_path / "a.xml", tmp_path / "out")
     assert "\n" not in str(caught.value)

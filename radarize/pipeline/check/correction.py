@@ -1,4 +1,4 @@
-"""Corrected recordings and boards."""
+"""Write corrected recordings and board files."""
 
 from pathlib import Path
 
@@ -18,37 +18,37 @@ from radarize.radar.cfg import write_cfg
 _BATCH = 16
 
 
-def write_mended(frames: Clip, findings: tuple[Finding, ...], output: Path) -> Path:
-    """Write a recording in which all is mended that can be; or, to a ``.yaml``, the board that is right.
+def write_corrected(frames: Clip, findings: tuple[Finding, ...], output: Path) -> Path:
+    """Write a recording in which everything is corrected that can be; or, to a ``.yaml``, the correct board.
 
     Args:
-        frames: of the recording.
-        findings: of its check.
+        frames: frames of the recording.
+        findings: findings of its check.
         output: file to write.
 
     Raises:
-        InputError: nothing can be mended, or `output` cannot be written.
+        InputError: nothing can be corrected, or `output` cannot be written.
     """
-    mended = [each for each in findings if each.mending is not None]
+    corrected = [each for each in findings if each.correction is not None]
     path = frames.recording.path
-    if not mended:
+    if not corrected:
         found = ", ".join(each.kind for each in findings) or "no fault"
-        raise InputError(f"{path}: --fix is given, but {found} was found, expected what reordering can mend")
+        raise InputError(f"{path}: --fix is given, but {found} was found, expected a fault that it can correct")
     evidence = Evidence.of(frames)
-    for each in mended:
-        assert each.mending is not None
-        evidence = evidence.mended(each.mending)
+    for each in corrected:
+        assert each.correction is not None
+        evidence = evidence.corrected(each.correction)
     if output.suffix in SUFFIXES:
         return _write_board(frames, evidence, output)
     if output.exists() and output.samefile(path):
-        raise InputError(f"{output}: is the recording that is read, expected another file")
-    return _write_recording(frames, evidence, output, [each.kind for each in mended])
+        raise InputError(f"{output}: is the input recording, expected another file")
+    return _write_recording(frames, evidence, output, [each.kind for each in corrected])
 
 
 def _write_board(frames: Clip, evidence: Evidence, output: Path) -> Path:
     board = load_board(evidence.config.board)
     if board == load_board(frames.config.board):
-        raise InputError(f"{output}: the board is right, expected a recording (.h5) to write")
+        raise InputError(f"{output}: the board is correct, expected a recording (.h5) to write")
     fields = board.model_dump(mode="json", exclude={"name"})
     return write_whole(output, yaml.safe_dump(fields, sort_keys=False, default_flow_style=None))
 
@@ -57,11 +57,11 @@ def _write_recording(frames: Clip, evidence: Evidence, output: Path, kinds: list
     source, config = frames.recording, evidence.config
     streams, products = along(source, [name for name in source.names() if not name.startswith("radar/")])
     if len(evidence.numbers) != len(source) or (np.diff(evidence.numbers) != 1).any():
-        # Rows that belong to frames by their numbers would belong to others.
+        # Rows that refer to frame numbers would refer to other frames.
         streams = {name: each for name, each in streams.items() if not each.clock.startswith("points/")}
     attributes = {k: v for k, v in source.attributes.items() if k not in ("format", "radarize_version")}
-    told = [str(attributes[name]) for name in ("warnings",) if attributes.get(name)]
-    attributes["warnings"] = "; ".join([*told, f"mended by radarize check: {', '.join(kinds)}"])
+    before = [str(attributes[name]) for name in ("warnings",) if attributes.get(name)]
+    attributes["warnings"] = "; ".join([*before, f"corrected by radarize check: {', '.join(kinds)}"])
     with RecordingWriter(
         output, config, cfg_text=source.cfg_text if config == source.config else write_cfg(config),
         attributes=attributes, streams=streams, products=products,
@@ -73,7 +73,7 @@ def _write_recording(frames: Clip, evidence: Evidence, output: Path, kinds: list
                 for name, each in streams.items()
                 if each.clock == "radar/time"
             }
-            # Instants of what belongs to frames go with the frames' stamps.
+            # Times of rows that belong to frames move with the stamps of the frames.
             later = evidence.times[part] - source.times[evidence.numbers[part]]
             rows |= {name: data + later for name, data in rows.items() if name.endswith("/time")}
             adc = evidence.read(part.start, part.stop)

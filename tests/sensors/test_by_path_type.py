@@ -1,4 +1,4 @@
-"""The I/Q by cause where a part exceeds the converter."""
+"""I/Q by path type where a part exceeds the converter's range."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from radarize.radar.presets import PRESETS
 from radarsim.motion.trajectory import Motion
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
-from radarsim.sensors.causes import AdcByCause
+from radarsim.sensors.by_path_type import AdcByPathType
 from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})
@@ -18,7 +18,7 @@ def test_parts_far_above_full_scale_add_up():
     scene = Scene.of({"objects": [wall | {"material": "metal"}]}, "wall")
     scenario = Scenario(scene, Motion.still((0, 0, 0)), CONFIG, FrontEndConfig.ideal(full_scale_dbm=-80))
     frames = scenario.frames(np.array([0.0]))
-    parts = AdcByCause(scenario).observe(frames)["truth/adc_by_cause"][0].astype(float)
+    parts = AdcByPathType(scenario).observe(frames)["truth/adc_by_cause"][0].astype(float)
     signal = scenario.synthesize(frames.lengths[0], frames.received[0])
     counts = scenario.board.receive(signal, np.random.default_rng(0))
     assert np.abs(counts).max() > 6e6

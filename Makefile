@@ -3,11 +3,11 @@
 # make notebooks: runs the notebooks, and prints how long each takes; fails if a cell fails
 # make docs: builds the pages of documentation, with an environment of its own (requirements-docs.lock)
 # make results: all pages of results, in days; RESULTS=--smoke a short trial of each part, RESULTS=walks one page
-# make lint: style, and types of what other programs import
+# make lint: style, types, and words that are not the field's (docs/words.yaml)
 # make lowest: tests, in an environment of their own, with the lowest versions that pyproject.toml allows
 # make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
 RUN := runs/demo
-# What is imported stays compiled, as setup.sh says.
+# What is imported stays compiled, see setup.sh.
 unexport PYTHONDONTWRITEBYTECODE
 # A file's tests share what it makes; files begin in the order of tests/conftest.py. A worker that crashes ends the run
 # with a failure: with another in its place, xdist waits for ever.
@@ -65,6 +65,7 @@ lint: setup
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
 	@.venv/bin/mypy --cache-dir build/mypy
+	@.venv/bin/python docs/words.py
 
 clean:
 	rm -rf .venv $(RUN) build *.egg-info

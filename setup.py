@@ -1,4 +1,4 @@
-"""Builds what pyproject.toml cannot say: `scenes/` of the repository is `radarsim/scenes` where it is installed."""
+"""Build step that pyproject.toml cannot describe: `scenes/` of the repository is `radarsim/scenes` where it is installed."""
 
 import shutil
 from pathlib import Path

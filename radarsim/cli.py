@@ -7,6 +7,7 @@ import typer
 
 from radarize.io.console import new_app, print_table, progress, run, working
 from radarize.io.errors import InputError
+from radarize.io.plugins import Plugins
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
 scene_app = typer.Typer(help="Show, import and export scenes.", no_args_is_help=True)
@@ -265,16 +266,14 @@ def import_(
 @app.command()
 def export(
     recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording to convert.")],
-    to: Annotated[
-        Literal["dca1000", "rosbag", "tum"], typer.Option(help="Format: raw samples + .cfg, ROS 2 bag, or true poses.")
-    ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output: .bin, a folder, or .tum.")],
+    format: Annotated[str, typer.Option(help=f"Format: {', '.join(Plugins('radarize.exporters', 'export format'))}.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of ros2 and roverd, folder to write.")],
 ) -> None:
-    """Export a recording to another format, as `radarize export` does."""
+    """Write a recording in another format; `radarize export` has more options."""
     from radarize.io.exporters import export
 
     with progress("export") as report:
-        written = export(recording, {"dca1000": "bin", "rosbag": "ros2"}.get(to, to), output, progress=report)
+        written = export(recording, format, output, progress=report)
     print(written)
 
 
@@ -333,6 +332,18 @@ def emulate(
                     time.sleep(0.5)
         except KeyboardInterrupt:
             print(f"{emulator}; {disturbance}")
+
+
+@app.command()
+def schema(
+    name: Annotated[Literal["scene", "dataset", "front-end", "board"], typer.Argument(help="Kind of YAML file.")],
+) -> None:
+    """Print the JSON schema of a kind of YAML file, by which editors complete and check it."""
+    import json
+
+    from radarsim.schema import schema
+
+    print(json.dumps(schema(name), indent=2))
 
 
 @app.command()

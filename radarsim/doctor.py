@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from radarize.io.errors import InputError
+from radarize.io.extras import EXTRAS
 from radarsim.machine import llvm
 
 #: Shared libraries that Python packages load from the system (all of them open3d's), and their Debian packages.
@@ -88,6 +89,7 @@ def findings() -> list[Finding]:
     return [
         _python(),
         *(_package(name) for name in PACKAGES),
+        *(_extra(name) for name in EXTRAS if name != "sim"),
         _llvm(),
         *(_library(library) for library in LIBRARIES if platform.system() == "Linux"),
         _ray_test(),
@@ -109,6 +111,15 @@ def _package(name: str) -> Finding:
         return Finding(name, "ok", importlib.metadata.version(name))
     except importlib.metadata.PackageNotFoundError:
         return Finding(name, "missing", "not installed", REPAIR)
+
+
+def _extra(extra: str) -> Finding:
+    """The optional packages of an extra of pyproject.toml."""
+    lacking = sorted(module for module in EXTRAS[extra] if importlib.util.find_spec(module) is None)
+    if not lacking:
+        return Finding(f"extra {extra}", "ok", ", ".join(sorted(EXTRAS[extra])))
+    remedy = f"pip install 'radarize[{extra}]'"
+    return Finding(f"extra {extra}", "optional", f"{', '.join(lacking)} not installed", remedy)
 
 
 def _llvm() -> Finding:

@@ -42,6 +42,7 @@ SIMULATOR = (
     "sensors",
     "recording",
     "dataset emulator twin doctor webpreview api",
+    "schema",
     "cli entry",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are

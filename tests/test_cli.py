@@ -3,13 +3,16 @@
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from radarize import __version__
 from radarize import cli as radarize_cli
 from radarize.io.console import run
 from radarize.io.errors import InputError
@@ -58,11 +61,32 @@ def test_help_is_instant(name):
      "radarize check", "radarize config", "radarize report", "radarize benchmark", "radarize export", "radarize view",
      "radarsim simulate", "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene",
      "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate",
-     "radarsim doctor"],
+     "radarsim schema", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")
     assert code == 0 and "Usage" in out
+
+
+@pytest.mark.parametrize("name", APPS)
+def test_version(capsys, name):
+    assert call(capsys, name, "--version") == (0, f"{name} {__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("command", "group"),
+    [
+        ("radarize train", "radarize.tasks"),
+        ("radarize run", "radarize.odometry"),
+        ("radarize run", "radarize.scans"),
+        ("radarize export", "radarize.exporters"),
+        ("radarsim export", "radarize.exporters"),
+    ],
+)
+def test_help_names_every_part_that_is_installed(capsys, command, group):
+    _, out, _ = call(capsys, command, "--help")
+    words = set(re.split(r"[^\w-]+", out))
+    assert {point.name for point in entry_points(group=group)} <= words
 
 
 @pytest.mark.parametrize(
@@ -88,7 +112,7 @@ def test_every_command_explains_itself(capsys, command):
         ("radarsim dataset", ["missing.yaml", "-o", "out"], "no specification 'missing.yaml', expected"),
         ("radarsim calibrate", ["missing.h5", "-o", "board.yaml"], "missing.h5: no such file"),
         ("radarsim twin", ["missing.h5", "--scene", "office", "-o", "twin.h5"], "missing.h5: no such file"),
-        ("radarsim export", ["missing.h5", "--to", "tum", "-o", "x.tum"], "missing.h5: no such file"),
+        ("radarsim export", ["missing.h5", "--format", "tum", "-o", "x.tum"], "missing.h5: no such file"),
         ("radarsim scene info", ["castle"], "castle"),
         ("radarsim scene import", ["castle.glb", "-o", "out"], "castle.glb: no such file"),
         ("radarsim scene import", ["castle.glb"], "Missing option"),
@@ -118,10 +142,10 @@ def test_errors_of_libraries_are_one_sentence(capsys, monkeypatch, tmp_path, err
         raise error
 
     monkeypatch.setattr("radarize.io.exporters.export", fail)
-    code, _, err = call(capsys, "radarsim export", tmp_path / "a.h5", "--to", "tum", "-o", tmp_path / "b")
+    code, _, err = call(capsys, "radarsim export", tmp_path / "a.h5", "--format", "tum", "-o", tmp_path / "b")
     assert code == 2 and expected in err and "Traceback" not in err
     with pytest.raises((type(error), SystemExit)):
-        run(APPS["radarsim"], "radarsim", ["export", "a.h5", "--to", "tum", "-o", "b", "--debug"])
+        run(APPS["radarsim"], "radarsim", ["export", "a.h5", "--format", "tum", "-o", "b", "--debug"])
 
 
 def test_debug_shows_the_traceback():
@@ -205,8 +229,8 @@ def test_a_full_disk_is_one_sentence(tmp_path):
             Path(sys.executable).parent / "radarsim",
             "export",
             source,
-            "--to",
-            "dca1000",
+            "--format",
+            "bin",
             "-o",
             folder / "x.bin",
         ]

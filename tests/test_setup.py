@@ -208,6 +208,14 @@ def test_doctor_finds_this_machine_usable(capsys):
     assert "LLVM" in out and "torch" in out and "ray test" in out and "missing" not in out
 
 
+def test_doctor_names_the_extras_that_are_not_installed(monkeypatch):
+    assert doctor._extra("viewer") == doctor.Finding("extra viewer", "ok", "foxglove, rerun")
+    monkeypatch.setitem(EXTRAS, "viewer", {"rerun", "nowhere"})
+    found = doctor._extra("viewer")
+    assert found.state == "optional" and found.detail == "nowhere not installed"
+    assert found.remedy == "pip install 'radarize[viewer]'"
+
+
 def test_doctor_writes_a_report_that_names_no_folder_of_the_user(monkeypatch):
     found = doctor.Finding("ray test", "ok", f"{Path.home()}/libLLVM.so.19.1")
     monkeypatch.setattr(doctor, "findings", lambda: [found, doctor.Finding("torch", "ok", "2.13.0")])

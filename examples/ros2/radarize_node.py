@@ -1,7 +1,7 @@
 """A ROS 2 node: radar SLAM on a real radar, or on a recording in real time.
 
     /scan  LaserScan, in `radar`        /odom  Odometry        /map  OccupancyGrid, latched
-    /tf    map -> odom -> base_link; the launch file says where the radar is on base_link
+    /tf    map -> odom -> base_link; the launch file gives the pose of the radar on base_link
 
 Parameters: `config` (a preset or a .cfg) and `port` of a radar, or `replay` (a recording); `odometry` and `scans`
 (methods; those of choice for the radar if empty). It is a file rather than a package, for rclpy comes with ROS and not
@@ -37,7 +37,7 @@ from radarize.signal.bearings import BEARINGS
 MAP, ODOM, BASE, RADAR = "map", "odom", "base_link", "radar"
 #: s between maps.
 MAP_INTERVAL = 2.0
-#: A ROS message's covariance has x y z roll pitch yaw; a radar in a plane knows these.
+#: A ROS message's covariance has x y z roll pitch yaw; a planar pose has these.
 PLANE = np.ix_([0, 1, 5], [0, 1, 5])
 
 

@@ -59,10 +59,18 @@ def run_(
 
 
 @app.command("config")
-def config_() -> None:
-    """Print all settings of the pipeline with their meaning, as YAML: `radarize config > mine.yaml`."""
+def config_(
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of such files instead.")] = False,
+) -> None:
+    """Print all settings of the pipeline as YAML with description and unit: `radarize config > mine.yaml`."""
+    import json
+
+    from radarize.io.schema import json_schema
     from radarize.pipeline.config import Configuration
 
+    if schema:
+        print(json.dumps(json_schema(Configuration, "Configuration of the pipeline"), indent=2))
+        return
     print(Configuration().text(), end="")
 
 
@@ -129,8 +137,8 @@ def export(
     format: Annotated[
         str,
         typer.Option(
-            help="bin (DCA1000 and .cfg), ros2 (a bag), radarize-ae (a ROS 1 bag for the paper's code), roverd, tum "
-            "(poses), ply (points of a recording, scans of a run) or map (for map_server)."
+            help=f"Format: {names('radarize.exporters')}. bin: DCA1000 samples and .cfg; ros2: a bag; radarize-ae: "
+            "a ROS 1 bag for the paper's code; tum: poses; ply: points; map: a run's map for map_server."
         ),
     ],
     run: Annotated[

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
+from radarize import __version__
 from radarize.io.errors import DEBUG, InputError, first_line, of_system
 from radarize.io.extras import lacking
 from radarize.io.files import OUTSIDE
@@ -37,10 +38,19 @@ def new_app(about: str) -> typer.Typer:
         allow_outside: Annotated[
             bool, typer.Option("--allow-outside", help="Let scenes, maps and data sets name files in other folders.")
         ] = False,
+        version: Annotated[
+            bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit.")
+        ] = False,
     ) -> None:
-        del debug, allow_outside  # taken from the arguments by `run`, so that they work in any place
+        del debug, allow_outside, version  # taken from the arguments by `run`, so that they work in any place
 
     return app
+
+
+def _print_version(context: typer.Context, wanted: bool) -> None:
+    if wanted:
+        print(f"{context.info_name} {__version__}")
+        raise typer.Exit
 
 
 def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None:

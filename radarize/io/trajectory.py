@@ -31,7 +31,14 @@ class Trajectory:
         velocity: (pose, 2 or 3) m/s in the sensor frame: forward, left, possibly up; None if unknown.
         velocity_covariance: (pose, 2, 2) m^2/s^2; None if unknown.
         floor_plan: (segment, 4) walls of the place, x0 y0 x1 y1 in m; None if unknown.
-        name: label in plots.
+        name: in plots.
+
+    Example:
+        >>> truth = rz.load("walk.h5").truth
+        >>> truth.planar.shape, round(truth.distance, 1)  # x, y, yaw; m
+        ((24, 3), 0.4)
+        >>> truth.to_tum("truth.tum").name
+        'truth.tum'
     """
 
     time: Float[np.ndarray, "pose"]

@@ -1,7 +1,9 @@
-"""Radar odometry. Call it as ``radarize.odometry(recording)``, see `radarize.estimate_odometry`.
+"""Radar odometry: ``radarize.odometry(recording)`` is `radarize.estimate_odometry`; the modules here are its parts.
 
-`integration.Odometry` is the algorithm. It takes velocities from `doppler`, `learned` or `fused`, and yaw increments
-from `rotation` or `learned`; `uncertainty` is its error model.
+Example:
+    >>> odometry = rz.odometry(rec, method="doppler")
+    >>> len(odometry), odometry.velocity.shape  # m/s
+    (24, (24, 2))
 """
 
 import sys

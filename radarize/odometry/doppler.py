@@ -56,58 +56,62 @@ class Velocities:
 
 
 class DopplerConfig(Frozen):
-    """Velocity from the Doppler shifts of echoes (`DopplerVelocity`)."""
+    """Ego-velocity from the Doppler shifts of single echoes (`DopplerVelocity`)."""
 
-    beams: int = setting(48, "azimuth beams of the cube, uniform in u_y", ge=8)
-    echoes: int = setting(160, "maximum number of peaks per frame, the strongest ones", ge=4)
-    threshold: float = setting(20.0, "minimum power of a peak over the median of the cube", gt=1)
-    min_range: float = setting(0.25, "m, minimum range; nearer peaks are transmitter leakage", ge=0)
-    direct: float = setting(
-        0.05, "prior odds that an echo is direct, times p / (1 - p), where p is the share of its cell's power that one "
-        "plane wave explains; this and the next chosen on 12 walks of 60 s (handheld, cart, robot; A to D of seeds 301 "
-        "to 304)", gt=0
-    )  # fmt: skip
-    guess: float = setting(0.015, "m/s, standard deviation of the velocity of a pair of echoes", gt=0)
-    hypotheses: int = setting(100, "number of pairs of echoes that are tried", ge=1)
-    speed_noise: float = setting(0.003, "m/s, standard deviation of the closing speed of a strong echo", gt=0)
-    power_noise: float = setting(
-        0.1, "m/s, additional standard deviation of an echo as strong as the median of the cube; it decreases with the "
-        "echo's amplitude", gt=0
-    )  # fmt: skip
-    azimuth_noise: float = setting(0.005, "standard deviation of an echo's u_y", gt=0)
-    elevation: float = setting(
-        0.4, "standard deviation of u_z over all echoes, the prior that shrinks measured u_z towards the horizon", gt=0
+    beams: int = setting(
+        48, "azimuth beams of the range-Doppler-azimuth cube, uniform in u_y, the sine of azimuth", "beams", ge=8
     )
+    echoes: int = setting(160, "maximum number of echoes per frame, strongest first", "echoes", ge=4)
+    threshold: float = setting(20.0, "minimum power of an echo over the median of the cube", "1", gt=1)
+    min_range: float = setting(0.25, "minimum range of an echo; nearer peaks are transmitter leakage", "m", ge=0)
+    direct: float = setting(
+        0.05, "prior odds that an echo is direct, times p / (1 - p), where p is the share of its cell's power that "
+        "one plane wave explains", "1", tuned="12 walks of 60 s (FURNISHED)", gt=0
+    )  # fmt: skip
+    guess: float = setting(
+        0.015, "standard deviation of the velocity of a pair of echoes", "m/s", tuned="12 walks of 60 s (FURNISHED)",
+        gt=0
+    )  # fmt: skip
+    hypotheses: int = setting(100, "pairs of echoes that are tried", "pairs", ge=1)
+    speed_noise: float = setting(0.003, "standard deviation of the radial velocity of a strong echo", "m/s", gt=0)
+    power_noise: float = setting(
+        0.1, "standard deviation of the radial velocity of an echo at the median of the cube; it decreases with "
+        "amplitude", "m/s", gt=0
+    )  # fmt: skip
+    azimuth_noise: float = setting(0.005, "standard deviation of an echo's u_y", "1", gt=0)
+    elevation: float = setting(
+        0.4, "prior standard deviation of u_z, the sine of elevation, over all echoes; it shrinks measured u_z "
+        "towards the horizon", "1", gt=0
+    )  # fmt: skip
     beam: float = setting(
-        0.25, "maximum standard deviation of u_z within one echo, given by the elevation beam; used where it is not "
-        "measured", gt=0
+        0.25, "maximum standard deviation of u_z within one echo, set by the elevation beam; used where no "
+        "elevation pair measures it", "1", gt=0
     )  # fmt: skip
     climb: float = setting(
-        0.15, "m/s, standard deviation of the vertical speed (bobbing of a handheld sensor); its mean is zero", gt=0
+        0.15, "standard deviation of the vertical velocity of a handheld radar; its mean is zero", "m/s", gt=0
     )
     still: float = setting(
-        0.02, "m/s; the velocity is set to zero below this speed if it agrees with zero within its covariance and most "
-        "echoes do not move", ge=0
+        0.02, "speed below which the sensor is at rest, if the speed is within its standard error and most echoes "
+        "are at rest", "m/s", ge=0
     )  # fmt: skip
     few: float = setting(
-        24.0, "number of inliers at which the covariance of the fit is doubled; it grows further with fewer inliers, "
-        "because more of them are multipath; chosen on 12 walks of 60 s (handheld, cart, robot; A to D of seeds 301 to "
-        "304)", ge=0
+        24.0, "inliers at which the covariance of the fit is doubled; with fewer it grows further, because a larger "
+        "share of them has come over several surfaces", "echoes", tuned="12 walks of 60 s (FURNISHED)", ge=0
     )  # fmt: skip
     scale_noise: float = setting(
-        0.003, "standard deviation of the error along the velocity that all echoes of a frame share, as a share of the "
-        "speed; it comes from their elevation", ge=0
+        0.003, "standard deviation of the error along the velocity that all echoes of a frame share (elevation), as "
+        "a fraction of speed", "1", tuned="6 walks of 20 s (ODOMETRY)", ge=0
     )  # fmt: skip
     course_noise: float = setting(
-        0.004, "rad, standard deviation of the error across the velocity that all echoes share: a common bias of "
-        "azimuth", ge=0
+        0.004, "standard deviation of the error across the velocity that all echoes of a frame share (azimuth)",
+        "rad", tuned="12 walks of 60 s (FURNISHED)", ge=0
     )  # fmt: skip
     rough: float = setting(
-        0.03, "standard deviation of the shared error along and across the velocity where the array does not measure "
-        "elevation, as a share of the speed; twice that for rows of fewer than 8 antennas; chosen on walks of 12 s "
-        "(handheld in B, cart in D, seed 311) with one and two transmitters and with two other boards", ge=0
+        0.03, "standard deviation of the shared error along and across the velocity, as a fraction of speed, for "
+        "arrays that do not measure elevation; twice that for azimuth rows of fewer than 8 antennas", "1",
+        tuned="12 walks of 12 s (RADARS_FURNISHED) with one and two transmitters and with three other boards", ge=0
     )  # fmt: skip
-    floor: float = setting(0.0005, "m/s, minimum standard deviation of a velocity", ge=0)
+    floor: float = setting(0.0005, "minimum standard deviation of a velocity", "m/s", ge=0)
 
 
 class DopplerVelocity:

@@ -79,14 +79,12 @@ class Track:
 
 
 class VelocityConfig(Frozen):
-    """Kalman filter of the velocity (`VelocityFilter`)."""
+    """Kalman filter of velocities (`VelocityFilter`)."""
 
-    wander: float = setting(
-        0.73, "m/s^1.5, random walk of the velocity of a handheld radar: its standard deviation after 1 s", gt=0
-    )
-    fastest: float = setting(2.0, "m/s, standard deviation of the velocity before any measurement", gt=0)
+    wander: float = setting(0.73, "random-walk density of the velocity of a handheld radar", "m/s^1.5", gt=0)
+    fastest: float = setting(2.0, "standard deviation of an unknown velocity", "m/s", gt=0)
     gate: float = setting(
-        9.0, "squared Mahalanobis distance above which a measurement is down-weighted (Huber-like)", gt=0
+        9.0, "squared Mahalanobis distance above which a measurement is down-weighted (Huber)", "1", gt=0
     )
 
 

@@ -80,7 +80,7 @@ class LearnedRotation:
         self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of the last `size` frames
         self._yaws = FixedLagSmoother(size, settings.wander, settings.fastest)
-        self._inflation = settings.alike
+        self._inflation = settings.variance_factor
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Return the yaw increments of the next frames; their variances add up to that of the yaw since the start."""

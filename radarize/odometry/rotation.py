@@ -95,52 +95,50 @@ class Rotations:
 
 
 class RotationConfig(Frozen):
-    """Matching of frames with a local map (`MapRotation`)."""
+    """Rotation by matching frames with a local map (`MapRotation`)."""
 
-    field: float = setting(0.85, "maximum |sin azimuth|", gt=0, lt=1)
-    columns: int = setting(69, "number of azimuth columns, uniform in sin azimuth", ge=8)
-    min_range: float = setting(0.2, "m, minimum range; nearer bins are transmitter leakage", ge=0)
-    limit: float = setting(300.0, "power over the noise floor to which a range-Doppler cell is limited", gt=0)
+    field: float = setting(0.85, "maximum |sin azimuth| that is used", "1", gt=0, lt=1)
+    columns: int = setting(69, "azimuth columns, uniform in sin azimuth", "columns", ge=8)
+    min_range: float = setting(0.2, "minimum range; nearer bins are transmitter leakage", "m", ge=0)
+    limit: float = setting(300.0, "power over the noise floor at which a range-Doppler cell is clipped", "1", gt=0)
     stretch: float = setting(
-        1.0, "factor on the sines of azimuth, for arrays whose antennas are not spaced as the board's file states; "
-        "`radarize calibrate` measures it; on eight furnished walks of 20 s (seeds 701 to 708) the mean ATE of SLAM is "
-        "0.056 m with 1.0 and 0.090 m with 1.025", ge=1, lt=1.1
+        1.0, "factor applied to measured sin azimuth; `radarize calibrate` measures it where the spacing of the "
+        "antennas differs from the board's file", "1", tuned="8 furnished walks of 20 s (seeds 701 to 708): mean "
+        "ATE of SLAM is 0.056 m with 1.0 and 0.090 m with 1.025", ge=1, lt=1.1
     )  # fmt: skip
-    contrast: float = setting(15.0, "dB over the surroundings at which a map cell is clipped", gt=0)
-    cell: float = setting(0.05, "m, side of a map cell", gt=0)
+    contrast: float = setting(15.0, "level over the surroundings at which a map cell is clipped", "dB", gt=0)
+    cell: float = setting(0.05, "side of a map cell", "m", gt=0)
     memory: float = setting(
-        1.6, "s, time constant of the map's forgetting; chosen together with the variance factor of `turns`: the error "
-        "of the heading over 10 s is 4.0 deg instead of 4.9 deg on seven walks of the tuning set, and 3.1 deg instead "
-        "of 3.8 deg on three walks of the test set", gt=0
-    )  # fmt: skip
-    fan: float = setting(np.radians(5.0), "rad, minimum half width of the yaw search", gt=0)
-    widest: float = setting(np.radians(75.0), "rad, maximum half width of the yaw search", gt=0, le=np.pi)
+        1.6, "time constant with which the map forgets", "s", tuned="7 walks of 20 to 60 s (TURNS)", gt=0
+    )
+    fan: float = setting(np.radians(5.0), "minimum half-width of the search over yaw", "rad", gt=0)
+    widest: float = setting(np.radians(75.0), "maximum half-width of the search over yaw", "rad", gt=0, le=np.pi)
     step: float = setting(
-        np.radians(0.5), "rad, step of the fine yaw search; the coarse search has three times that", gt=0
+        np.radians(0.5), "step of the search over yaw; the coarse search takes three times that", "rad", gt=0
     )
     wander: float = setting(
-        np.radians(66.0), "rad/s^1.5, random walk of the yaw rate of a handheld radar: its standard deviation after "
-        "1 s", gt=0
-    )  # fmt: skip
-    fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of the yaw rate before any measurement", gt=0)
-    yaw_noise: float = setting(np.radians(0.3), "rad, standard deviation of a match with correlation 1", gt=0)
+        np.radians(66.0), "random-walk density of the turn rate of a handheld radar", "rad/s^1.5", gt=0
+    )
+    fastest: float = setting(np.radians(60.0), "standard deviation of an unknown turn rate", "rad/s", gt=0)
+    yaw_noise: float = setting(
+        np.radians(0.3), "standard deviation of the yaw of a match with correlation 1", "rad", gt=0
+    )
     guided_yaw_noise: float = setting(
-        np.radians(2.4), "rad, the same if a network estimates rotation too; larger because a map that lags in a turn "
-        "makes the errors of many matches correlated; chosen together with `doubt`", gt=0
+        np.radians(2.4), "the same where a network estimates turns too; larger, because a map that lags in a turn "
+        "biases many consecutive matches", "rad", tuned="4 handheld walks of 60 s (of FURNISHED)", gt=0
     )  # fmt: skip
     doubt: float = setting(
-        2.0, "factor on the variance that the network estimates for a yaw increment; chosen on four handheld walks of "
-        "60 s in furnished rooms (A to D of seeds 301 to 304), where the error of the heading over 10 s is 4.0 deg and "
-        "hardly depends on it", ge=1
+        2.0, "factor on the variance of a network's turn", "1",
+        tuned="4 handheld walks of 60 s (of FURNISHED), heading error over 10 s of 4.0 deg", ge=1
     )  # fmt: skip
-    least_correlation: float = setting(0.15, "minimum correlation of an accepted match", ge=0, lt=1)
+    least_correlation: float = setting(0.15, "minimum correlation of an accepted match", "1", ge=0, lt=1)
     right_angles: bool = setting(
-        True, "correct the heading by walls that are observed again, assuming that most walls of the building are at "
-        "right angles; set it to false for buildings without right angles"
+        True, "correct the heading by wall directions, assuming that most walls of a building are at right angles; "
+        "false for other buildings"
     )  # fmt: skip
     unseen: float = setting(
-        np.radians(40.0), "rad/s^0.5, additional random walk of the yaw where neither matches nor bearings observe it; "
-        "people who turn there turn by 40 to 80 deg", ge=0
+        np.radians(40.0), "random-walk density of the yaw where neither matches nor bearings observe it, added to "
+        "that of the filter", "rad/s^0.5", ge=0
     )  # fmt: skip
 
 

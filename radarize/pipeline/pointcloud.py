@@ -22,7 +22,12 @@ class PointCloud:
 
     Attributes:
         points: (point, 6) x forward, y left, z up (m), radial speed (m/s, closing positive), SNR and noise (dB).
-        frame: (point,) frame number of each point.
+        frame: (point,) number of the frame that each belongs to.
+
+    Example:
+        >>> points = rz.point_cloud(rec[:2])
+        >>> points.xyz.shape[1], set(points.frame) <= {0, 1}
+        (3, True)
     """
 
     points: Float[np.ndarray, "point 6"]

@@ -5,9 +5,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Complex, Float
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from radarize.io.errors import InputError
+from radarize.io.schema import Described
 from radarize.radar.boards import BOARDS, SUFFIXES, Board, expected, load_board
 
 SPEED_OF_LIGHT = 299_792_458.0
@@ -44,40 +45,41 @@ def _receivers(fields: dict[str, Any]) -> tuple[int, ...]:
     return tuple(range(len(load_board(fields["board"]).rx))) if "board" in fields else ()
 
 
-class RadarConfig(BaseModel):
+class RadarConfig(Described):
     """One TDM-MIMO chirp profile of a TI xWR radar.
 
     Times count from the start of a chirp's cycle: idle time first, then the ramp, in which the ADC samples from
     ``idle_time + adc_start_time`` on. All chirps of a frame use one profile; they differ in their transmitter only.
 
     Attributes:
-        board: a name of `radarize.radar.boards.BOARDS`, or any other board. The path of a board's file is replaced by
-            the board, which a recording stores.
+        board: name in `radarize.radar.boards.BOARDS`, or the path of a board's file, whose content a recording keeps.
         start_frequency: carrier at the start of the ramp, Hz.
         slope: chirp slope, Hz/s.
-        idle_time, adc_start_time, ramp_end_time: s; the last two count from the ramp's start.
+        idle_time: idle time before the ramp, s.
+        adc_start_time: start of sampling after the start of the ramp, s.
+        ramp_end_time: end of the ramp after its start, s.
         samples: complex samples per chirp and receiver.
-        sample_rate: Hz, complex-1x.
+        sample_rate: complex sample rate (complex-1x), Hz.
         loops: repetitions of the transmitter sequence per frame.
-        frame_period: s, start to start.
+        frame_period: time from the start of a frame to the start of the next, s.
         tx_order: transmitters in firing order, 0-based physical numbers (TX1 is 0). One that fires several times in a
             loop is listed as often, with its own index on the tx axis each time; several that fire simultaneously are
             listed as a tuple, and count as one transmitter midway between them.
         rx: enabled receivers, 0-based physical numbers, ascending; all of the board if not given.
-        loop_idle_time: pause after a loop's last chirp, s (low-power chips: rest of the burst period).
-        bpm: slots, 0-based, of the two chirps in which two transmitters use binary phase modulation: their sum
-            in the first and their difference in the second. `radarize.radar.dca1000` demodulates them, so that samples
-            are those of `tx_order`, one transmitter after the other. None: no modulation.
+        loop_idle_time: pause after a loop's last chirp, s (low-power chips: the rest of the burst period).
+        bpm: slots, 0-based, of the two chirps in which two transmitters send in binary phase modulation: their sum in
+            the first and their difference in the second. `radarize.radar.dca1000` separates them, so that samples are
+            those of `tx_order`, one transmitter after the other. None: no binary phase modulation.
         rx_gain_db: receive gain, dB.
         tx_backoff_db: transmit power below maximum, dB.
         high_pass: corner frequencies of the two high-pass stages, Hz.
         iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo); or
             ``"real"``: twice as many real samples at twice the rate, of which the complex ones are made.
-        range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``); default: the
-            board's.
+        range_bias: bias that is subtracted from measured ranges, m (first field of ``compRangeBiasAndRxChanPhase``);
+            default: the board's.
         channel_calibration: measured complex factor per *physical* (tx, rx) of the board as (re, im) pairs: TX1 x RX1,
-            RX2, ..., then TX2, ... None: the board's: measured, or nominal, which removes its antennas' signs. Ones,
-            the default in TI's files, count as None.
+            RX2, ..., then TX2, ... None, and factors that are all 1, as in TI's files before a calibration: the board's
+            factors, measured or nominal (the signs of its antennas).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

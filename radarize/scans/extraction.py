@@ -21,27 +21,27 @@ from radarize.signal.points import Cfar, level_around
 
 
 class ScanConfig(Frozen):
-    """Detection of echoes in range-azimuth maps."""
+    """Detection of echoes in range-azimuth maps, for scans without networks."""
 
-    min_range: float = setting(0.3, "m, minimum range; nearer cells hold transmitter leakage", ge=0)
-    above_noise_db: float = setting(15.0, "dB, minimum power of an echo over the noise", gt=0)
+    min_range: float = setting(0.3, "minimum range of an echo; nearer cells hold transmitter leakage", "m", ge=0)
+    above_noise_db: float = setting(15.0, "minimum level of an echo above the noise", "dB", gt=0)
     below_ring_db: float = setting(
-        15.0, "dB, maximum difference of an echo from the strongest of all bearings at its range; weaker cells are "
-        "regarded as sidelobes of that echo", gt=0
+        15.0, "maximum level of an echo below the strongest cell at its range; weaker ones are taken for sidelobes",
+        "dB", gt=0
     )  # fmt: skip
     below_bearing_db: float = setting(
-        6.0, "dB, maximum difference of an echo from the strongest of all ranges on its bearing; weaker and nearer "
-        "cells are regarded as clutter above or below the plane, or as sidelobes of a neighbour: in simulated offices "
-        "6 dB halves the number of echoes that are too near and removes 10 % of the others", gt=0
+        6.0, "maximum level of an echo below the strongest cell on its bearing; weaker and nearer ones are clutter "
+        "above or below the plane, or the skirt of a neighbour. 6 dB halves the echoes that are too near and "
+        "removes one in ten of the others", "dB", tuned="simulated offices", gt=0
     )  # fmt: skip
     noise_quantile: float = setting(
-        0.25, "quantile of the cells of a frame that estimates the noise, as most cells are behind the walls of a room",
-        gt=0, lt=1
+        0.25, "quantile of a frame's cells that is taken as noise level; most cells of a room are behind its walls",
+        "1", gt=0, lt=1
     )  # fmt: skip
-    cfar: Cfar = setting(Cfar(window=8, guard=4, threshold=10.0), "CFAR in range and in bearing, for method cfar")
+    cfar: Cfar = Cfar(window=8, guard=4, threshold=10.0)
     elevation_power: float = setting(
-        2.0, "exponent of the suppression of echoes from above and below, for method elevation-aware: the power of a "
-        "cell is multiplied with (elevation-aware / reference power)^this, at most 1", gt=0
+        2.0, "exponent that attenuates echoes off the horizon, for scans by elevation-aware: power is multiplied "
+        "with (elevation-aware / reference power)^exponent, at most 1", "1", gt=0
     )  # fmt: skip
 
 

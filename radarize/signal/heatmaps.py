@@ -26,9 +26,11 @@ AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
 
 
 class HeatmapConfig(Frozen):
-    """Settings of the heat maps."""
+    """Spectra and beamformers of the classical methods."""
 
-    loading: float = setting(0.01, "diagonal loading of Capon's covariance, as a share of its mean eigenvalue", gt=0)
+    loading: float = setting(
+        0.01, "diagonal loading of Capon's covariance, as a fraction of its mean eigenvalue", "1", gt=0
+    )
 
 
 class Heatmaps:

@@ -18,7 +18,7 @@ from pydantic import Field
 from scipy.ndimage import maximum_filter
 
 from radarize.io.errors import InputError
-from radarize.io.plain import Frozen
+from radarize.io.plain import Frozen, setting
 from radarize.radar.array import azimuth_row, row_beside, rows, virtual_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.windows import periodic
@@ -29,19 +29,12 @@ COLUMNS = ("x", "y", "z", "velocity", "snr", "noise")
 
 
 class Cfar(Frozen):
-    """One ``cfarCfg`` line: a cell is detected if it is `threshold` above the level of its neighbours.
+    """CFAR along one axis, as one ``cfarCfg`` line: a cell is detected if it exceeds the level of its neighbours."""
 
-    Attributes:
-        window: cells averaged on each side.
-        guard: cells left out on each side.
-        threshold: dB.
-        smallest: compare with the lower of the two sides (CASO) rather than with their mean (CA).
-    """
-
-    window: int = Field(8, ge=1)
-    guard: int = Field(4, ge=0)
-    threshold: float = 15.0
-    smallest: bool = False
+    window: int = setting(8, "cells averaged on each side", "cells", ge=1)
+    guard: int = setting(4, "cells left out on each side", "cells", ge=0)
+    threshold: float = setting(15.0, "minimum level above the neighbours", "dB")
+    smallest: bool = setting(False, "compare with the lower of the two sides (CASO) instead of their mean (CA)")
 
 
 class PointCloudConfig(Frozen):

@@ -66,7 +66,7 @@ class Slam:
     def __init__(self, config: SlamConfig | None = None, endless: bool = False):
         self.config, self.endless = config or SlamConfig(), endless
         self.odometry = Odometry(self.config.odometry, endless)
-        self.graph = PoseGraph(self.config.loop.inlier_probability, self.config.matcher.alike)
+        self.graph = PoseGraph(self.config.loop.inlier_probability, self.config.matcher.correlated)
         self.nodes: list[Node] = []
         self.submaps: list[Submap] = []
         self.skipped = {"odometry": 0, "scans": 0}

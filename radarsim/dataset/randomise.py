@@ -1,4 +1,4 @@
-"""Domain randomisation: parameters drawn for each recording of a data set (default: `randomise.yaml`).
+"""``randomise`` draws values per recording. The default, ``randomise.yaml``, is the range of real rooms.
 
     randomise:
       clutter: {uniform: [0.7, 1.4]}                  # low, high
@@ -8,9 +8,8 @@
       height: {handheld: {uniform: [1.0, 1.4]}, cart: 0.95}                # by platform; a number is a constant
 
 Fields that are not named are not drawn: ``randomise: {}`` draws nothing. Normal distributions are truncated at three
-standard deviations. Fields that a building of the data set sets itself (``clutter: 0``), or a variant's mounting, are
-not drawn. A draw is keyed by the recording's seed and the field. It depends on no other field or recording, nor on the
-order in which they are made, and the variants of a recording share it.
+standard deviations. Fields that a building of the data set sets (``clutter: 0``) or that a variant's mounting sets are
+not drawn. A value depends on the recording's seed and on the field only; variants of a recording share it.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -111,6 +110,20 @@ class Distribution:
         deviations = min(max(float(ndtri(low + share * (high - low))), -_END), _END)
         return first + last * deviations if self.kind == "normal" else first * float(np.exp(last * deviations))
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: object, handler: object) -> dict[str, Any]:
+        number = {"type": "number"}
+        two = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+        lists = {kind: two for kind in _NUMBERS} | {"choice": {"type": "array", "items": number, "minItems": 1}}
+        named = [
+            {
+                "type": "object", "properties": {kind: numbers | {"description": _NUMBERS[kind]}},
+                "required": [kind], "additionalProperties": False,
+            }
+            for kind, numbers in lists.items()
+        ]  # fmt: skip
+        return {"description": f"A number, which is a constant, or one of {_KINDS}.", "anyOf": [number, *named]}
+
     def __str__(self) -> str:
         numbers = ", ".join(f"{number:g}" for number in self.numbers)
         return numbers if self.kind == "constant" else f"{self.kind} {numbers}"
@@ -123,11 +136,12 @@ class Randomise(Frozen):
     """Distributions by field; None: the field is not drawn.
 
     Attributes:
-        clutter, unevenness: as in a scene file, in place of what the scene has.
-        furniture: number of pieces of furniture in a building, relative to the style's.
-        permittivity, conductivity: factors of a material's values, drawn for each material.
+        clutter, unevenness: value in place of that of the scene file.
+        furniture: number of pieces of furniture in a building, as a fraction of the usual number.
+        permittivity, conductivity: factor on that of a material, drawn for each material.
         height: height of the sensor above the floor, m.
-        pitch, roll: of the sensor relative to its platform, degrees; pitch positive: nose down.
+        pitch: pitch of the sensor on its platform, positive nose down, degrees.
+        roll: roll of the sensor on its platform, degrees.
     """
 
     clutter: Drawn = None

@@ -1,4 +1,4 @@
-"""Specification of a data set: a YAML file that expands to a list of recordings.
+"""A data set is specified by a YAML file, which stands for a list of recordings.
 
     name: two-floors
     seed: 1
@@ -14,21 +14,21 @@
     radar: radarize                    # preset or .cfg file
     frontend: board.yaml               # as `radarsim calibrate` writes it; the board's own by default
     sensors: [depth, imu]              # or all, or none
-    storage: raw                       # or heatmaps: no samples, 37 % of the size, for training
+    storage: raw                       # or heatmaps: heat maps without samples, for training
     variants:                          # every recording once for each, with the same seed and walk
       plain: {}
       coarse: {radar: {samples: 48}, attributes: {value: 48}}             # see `radarsim.dataset.variant`
-    randomise:                         # drawn for each recording; by default as in real rooms, {}: nothing
+    randomise:                         # drawn per recording; default: the range of real rooms; {}: nothing
       clutter: {uniform: [0.7, 1.4]}                                    # see `radarsim.dataset.randomise`
     splits:
       random: {kind: random, folds: 5}                                  # random-0 ... random-4
       platform: {kind: platform, train: [handheld]}                     # tested on all others
       building: {kind: building, held_out: [A, shop]}                   # building-A, building-shop
 
-A recording is named BUILDING_FLOOR_PLATFORM_NUMBER, plus _VARIANT if there are variants. Its seed depends only on the
-data set's seed and its name without the variant, so a recording stays the same whatever else the data set contains.
-Recordings can follow `waypoints` ([[x, y], ...], m) instead of a tour. `attributes`, of the data set, of recordings or
-of a variant, become attributes of the files.
+The name of a recording is BUILDING_FLOOR_PLATFORM_NUMBER, with _VARIANT where there are variants. Its seed depends only
+on the data set's seed and on the name without the variant: a recording is the same in any order of simulation and with
+any other recordings beside it. ``waypoints`` ([[x, y], ...], m) replace the planned tour. ``attributes`` of the data
+set, of recordings or of a variant become attributes of the files.
 """
 
 import fnmatch
@@ -49,6 +49,7 @@ from radarize.io.yamlfile import read_yaml
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
+from radarsim.dataset.fields import OF_SCENE, Place, SensorName
 from radarsim.dataset.randomise import OF_SENSOR, Platform, Randomise
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
@@ -56,9 +57,7 @@ from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import described, description_model, find, shipped, split_level
 from radarsim.world.validation import format_validation_error
 
-#: Keys of a building that are top-level keys in a scene file, beside `building`.
-OF_SCENE = "clutter", "unevenness", "furniture", "materials", "interferers"
-#: Largest number of recordings of a data set: a mistyped count must not exhaust the memory.
+#: Recordings that a data set may stand for: a count with a digit too many takes all memory.
 MOST = 20_000
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
@@ -67,16 +66,16 @@ class Recordings(Frozen):
     """A group of recordings in one building.
 
     Attributes:
-        building: a name in `Specification.buildings`, or a pattern that matches some of them (`fnmatch`).
-        floors: floors, used in turn; empty for buildings without floors.
-        platform: one platform, or several with `count` recordings each.
+        building: name in `buildings`, or a pattern of several names (* and ?).
+        floors: floors that the recordings use in turn; none for buildings without floors.
+        platform: platform, or several with `count` recordings each.
         count: number of recordings per platform.
-        duration: duration of each, s.
-        waypoints: way-points instead of a tour, m.
-        people: number of pedestrians near the radar's path in each.
-        variants: names in `Specification.variants`; empty: all of them.
-        by_turns: use one variant per matching building, in turn, instead of all variants.
-        attributes: attributes of the recordings.
+        duration: length of each recording, s.
+        waypoints: way-points x, y instead of a planned tour, m.
+        people: number of pedestrians near the radar's path.
+        variants: names in `variants`; default: all.
+        by_turns: use one variant per matching building, in turn, instead of all.
+        attributes: attributes of the files.
     """
 
     building: Annotated[str, Field(pattern=r"^[A-Za-z0-9*?!\[\]-]+$")]
@@ -105,15 +104,30 @@ class Recordings(Frozen):
 
 
 class Specification(Frozen):
-    """Specification of a data set; the module's docstring shows an example."""
+    """A data set's specification; see the head of this file.
+
+    Attributes:
+        name: name of the data set.
+        seed: seed of all recordings.
+        buildings: buildings by name: a generated building, a scene of the project, or a scene file beside this one.
+        recordings: groups of recordings.
+        radar: preset or .cfg file.
+        frontend: front-end file as `radarsim calibrate` writes it; default: the board's.
+        sensors: sensors that are simulated beside the radar: names, all or none.
+        storage: raw samples, or heat maps without samples for training.
+        variants: variants of every recording by name; seed and trajectory are the same in each.
+        attributes: attributes of the files.
+        randomise: distributions of what differs between recordings; default: that of real rooms; {}: nothing.
+        splits: splits into training, validation and test recordings, by name.
+    """
 
     name: Name
     seed: int = Field(0, ge=0)
-    buildings: dict[Name, dict | str] = Field(min_length=1)
+    buildings: dict[Name, Annotated[dict | str, Place()]] = Field(min_length=1)
     recordings: tuple[Recordings, ...] = Field(min_length=1)
     radar: str = "radarize"
     frontend: str | None = None
-    sensors: tuple[str, ...] | Literal["all", "none"] = "none"
+    sensors: tuple[Annotated[str, SensorName()], ...] | Literal["all", "none"] = "none"
     storage: Literal["raw", "heatmaps"] = "raw"
     variants: dict[Name, Variant] = {}
     attributes: Attributes = {}

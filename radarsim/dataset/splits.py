@@ -15,7 +15,15 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class RandomSplit(Frozen):
-    """Random split, drawn independently for each of `folds` splits NAME-0, NAME-1, ..."""
+    """Drawn anew for each of `folds` splits, called NAME-0, NAME-1, ...
+
+    Attributes:
+        kind: of split.
+        folds: number of splits.
+        train: fraction of the recordings that train.
+        validation: fraction that validates.
+        test: fraction that tests.
+    """
 
     kind: Literal["random"]
     folds: int = Field(5, gt=0, le=100)
@@ -43,12 +51,19 @@ class RandomSplit(Frozen):
 
 
 class PlatformSplit(Frozen):
-    """Train on some platforms, test on others (default: all others)."""
+    """Trained on some platforms, tested on others.
+
+    Attributes:
+        kind: of split.
+        train: platforms that train.
+        test: platforms that test; default: all others.
+        validation: fraction of the training recordings that validates instead.
+    """
 
     kind: Literal["platform"]
     train: tuple[str, ...] = Field(min_length=1)
     test: tuple[str, ...] | None = None
-    validation: Share = 0.1  # fraction of the training recordings
+    validation: Share = 0.1
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
         """Parts of each split by its name.
@@ -67,11 +82,17 @@ class PlatformSplit(Frozen):
 
 
 class BuildingSplit(Frozen):
-    """Leave one building out: for each of `held_out` a split NAME-BUILDING, trained on all others."""
+    """Leave one building out: for each of `held_out` a split NAME-BUILDING, trained on all others.
+
+    Attributes:
+        kind: of split.
+        held_out: buildings that test, one per split; default: every building.
+        validation: fraction of the training recordings that validates instead.
+    """
 
     kind: Literal["building"]
-    held_out: tuple[str, ...] | None = None  # every building if absent
-    validation: Share = 0.1  # fraction of the training recordings
+    held_out: tuple[str, ...] | None = None
+    validation: Share = 0.1
 
     def members(self, name: str, tasks: Sequence[Task], rng: np.random.Generator) -> dict[str, Members]:
         """Parts of each split by its name.

@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from radarize.io.plain import Frozen
+from radarize.io.schema import Changes
 from radarize.io.yamlfile import changed
 from radarize.radar.boards import BOARDS, Board, load_board
 from radarize.radar.config import RadarConfig
@@ -17,19 +18,19 @@ Attributes = dict[str, str | float | int | bool]
 
 
 class Variant(Frozen):
-    """Changes against the specification.
+    """Changes of a recording against the specification.
 
     Attributes:
-        level: level of a scene that has levels (`radarsim.world.description`); the walk is planned at level 0.
-        radar: fields of `RadarConfig` to change, or a preset that replaces the radar.
-        frontend: fields of `FrontEndConfig` to change; nested ones are merged.
-        mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
-        attributes: attributes of the recordings.
+        level: level of the scene (`radarsim.world.description`); the trajectory is planned in its level 0.
+        radar: fields of `RadarConfig` to change, or a preset in place of the radar.
+        frontend: fields of `FrontEndConfig` to change; of its parts, those given.
+        mounting: mounting of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
+        attributes: attributes of the files.
     """
 
     level: int = Field(0, ge=0)
-    radar: dict[str, object] | str = {}
-    frontend: dict[str, object] = {}
+    radar: Annotated[dict[str, object] | str, Changes(RadarConfig, tuple(PRESETS))] = {}
+    frontend: Annotated[dict[str, object], Changes(FrontEndConfig)] = {}
     mounting: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
     attributes: Attributes = {}
 

@@ -5,20 +5,19 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 from numba import njit
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from radarize.io.plain import Frozen
 from radarize.radar.boards import Board, load_board
 
 
-class Cut(BaseModel):
-    """Gain relative to the peak along one axis, interpolated linearly between points.
+class Cut(Frozen):
+    """Gain below the peak along one axis, linear between its points.
 
     Attributes:
         degrees: angle from boresight, either side, ascending from 0 to 90.
-        loss_db: loss at these angles, dB below the peak.
+        loss_db: loss at the angles below the peak, dB.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     degrees: tuple[float, ...]
     loss_db: tuple[float, ...]
@@ -33,10 +32,14 @@ class Cut(BaseModel):
         return self
 
 
-class Antenna(BaseModel):
-    """Pattern of an element: the product of an azimuth and an elevation cut."""
+class Antenna(Frozen):
+    """An element's pattern: the product of an azimuth and an elevation cut.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    Attributes:
+        peak_dbi: peak gain, dBi.
+        azimuth: cut in the horizontal plane.
+        elevation: cut in the vertical plane.
+    """
 
     peak_dbi: float = Field(ge=-30, le=40)
     azimuth: Cut

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 from jaxtyping import Complex, Float
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from radarize.io.errors import InputError
+from radarize.io.plain import Frozen
 from radarize.io.replacing import replacing
 from radarize.io.yamlfile import changed, read_yaml
 from radarize.radar.boards import Board, load_board
@@ -20,12 +21,13 @@ from radarsim.propagation.antenna import ISOTROPIC, Antenna
 from radarsim.world.validation import format_validation_error
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Channel(Frozen):
+    """A complex amplitude of one (tx, rx) channel.
 
-
-class Channel(_Strict):
-    """Complex gain of one (tx, rx) channel."""
+    Attributes:
+        gain_db: magnitude, dB.
+        phase_deg: phase, degrees.
+    """
 
     gain_db: float
     phase_deg: float
@@ -43,7 +45,13 @@ class Channel(_Strict):
         )
 
 
-class _PerChannel(_Strict):
+class _PerChannel(Frozen):
+    """A property of each channel.
+
+    Attributes:
+        channels: measured amplitudes in physical order: TX1 x RX1, RX2, ..., then TX2, ...
+    """
+
     channels: tuple[Channel, ...] | None = None
 
     def measured(self, board: Board, source: str = "front end") -> Complex[np.ndarray, "tx rx"]:
@@ -69,7 +77,8 @@ class Mismatch(_PerChannel):
     bounds, as on a real board: all channels of a TX share its error.
 
     Attributes:
-        gain_db, phase_deg: bounds of a channel's error (data sheet SWRS228: 0.5 dB and 3 deg over temperature).
+        gain_db: bound of a channel's gain error, dB (data sheet SWRS228: 0.5 dB over temperature).
+        phase_deg: bound of a channel's phase error, degrees (data sheet SWRS228: 3 deg over temperature).
         channels: measured factors in physical order (TX1 x RX1..4, TX2, TX3), instead of drawn ones.
     """
 
@@ -78,15 +87,15 @@ class Mismatch(_PerChannel):
 
 
 class Leakage(_PerChannel):
-    """Leakage from TX to RX on the board: one static echo at nearly zero range.
+    """Leakage from TX to RX on the board: one static echo at almost zero range.
 
     The default lies within the results of `radarsim calibrate` on three public captures of two boards: -42, -47 and -49
         dB
     at 0.42, 0.36 and 0.69 ns.
 
     Attributes:
-        level_db: received over transmitted power, before the high-pass filter; each channel has a random phase.
-        delay: s.
+        level_db: received over transmitted power before the high-pass filter, dB; each channel has a random phase.
+        delay: delay of the leakage, s.
         channels: measured amplitudes in physical order, instead of `level_db` and random phases.
     """
 
@@ -102,8 +111,8 @@ class MountEcho(_PerChannel):
     levels that spread like those of independent complex normal amplitudes.
 
     Attributes:
-        distance: m.
-        level_db: received over transmitted power, mean over boards and channels, before the high-pass filter.
+        distance: distance of the echo, m.
+        level_db: received over transmitted power before the high-pass filter, mean over boards and channels, dB.
         channels: measured amplitudes in physical order, instead of `level_db` and amplitudes drawn for the board.
     """
 
@@ -116,12 +125,13 @@ class MountEcho(_PerChannel):
         return 2 * self.distance / SPEED_OF_LIGHT
 
 
-class PhaseNoise(_Strict):
+class PhaseNoise(Frozen):
     """Single-sideband phase noise of the transmitted signal.
 
     Attributes:
-        offset_hz, dbc_hz: mask, straight lines over the logarithm of the offset.
-        lower_band_db: added where the sweep is below 77 GHz.
+        offset_hz: offsets of the mask from the carrier, Hz, ascending.
+        dbc_hz: phase noise at the offsets, dBc/Hz, linear over the logarithm of the offset in between.
+        lower_band_db: added below 77 GHz, dB.
     """
 
     offset_hz: tuple[float, ...]
@@ -136,12 +146,17 @@ class PhaseNoise(_Strict):
         return self
 
 
-class Band(_Strict):
-    """Amplitude response of the decimation filter over the beat frequency, as fractions of the sample rate.
+class Band(Frozen):
+    """The decimation filter's amplitude response over the beat frequency, as fractions of the sample rate.
 
-    0 at `low`, 1 from 0 to `flat`, 0 from `high` on, linear in between. Noise of real captures falls by 2 to 9 dB in
+    0 at `low`, 1 from 0 to `flat`, 0 from `high` on, straight in between. Noise of real captures falls by 2 to 9 dB in
     the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. The
-    simulator finds echoes up to the closed end of the band, where they fade out smoothly.
+    simulator searches echoes up to the frequency `high`.
+
+    Attributes:
+        low: beat frequency of zero response, below zero, as a fraction of the sample rate.
+        flat: end of the pass band.
+        high: beat frequency from which the response is zero.
     """
 
     low: float = Field(-0.06, lt=0)
@@ -164,29 +179,34 @@ class Band(_Strict):
         return np.sum(self.response(np.add.outer(aliases, x)) ** 2, axis=0)
 
 
-class FrontEndConfig(_Strict):
-    """Settings of everything between the field at the antennas and the samples in the file.
+class FrontEndConfig(Frozen):
+    """Everything between the field at the antennas and the samples in the file.
 
     Attributes:
         antenna: pattern of each element; null: isotropic.
-        tx_power_dbm: per transmitter at no back-off.
-        noise: thermal noise.
-        noise_figure_db: by receive gain in dB. Between two points and beyond them by Friis's formula: the noise factor
-            is linear in 1 / gain.
-        full_scale_dbm: power of a complex tone of 32767 counts after the receive gain. Not in the data sheet; 5 dBm
-            puts the noise floor at 10.6 counts in the `radarize` preset, as against 14 counts (4 to 5 Msps) in real
-            captures, and clips 1 dB below the in-band compression point (-24 dBm at 30 dB).
-        adc_bits: resolution. 16: all bits of the file carry signal, as in real captures, where the decimation filter
-            has averaged a faster converter. 12: steps of 16 counts.
-        leakage, mismatch, phase_noise: null: none.
-        mount: static echoes of the radar's own housing and mount; null: none. The default is the middle of the results
-            of `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
-            at 0.14, 0.13 and 0.25 m, one in each.
-        if_bandwidth_hz: of the IF amplifier; limits the range where no decimation filter does.
-        high_pass: the two first-order stages of the radar configuration.
-        band: null: flat up to `if_bandwidth_hz` (echoes beyond the maximum range fold).
-        image_rejection_db: of the I/Q mixer (data sheet: 30 dB); null: perfect. The image of beat frequency f is at
-            -f, outside the band of complex-1x sampling, so only images of near echoes pass `band`.
+        tx_power_dbm: transmit power per transmitter without back-off, dBm.
+        noise: simulate thermal noise.
+        noise_figure_db: noise figure by receive gain (both dB). Between two gains and beyond them it follows Friis's
+            formula: the noise factor is linear in 1 / gain.
+        full_scale_dbm: power of a complex tone of 32767 counts after the receive gain, dBm. Not in the data sheet;
+            5 dBm puts the noise floor at 10.6 counts in the `radarize` preset (14 counts at 4 to 5 Msps in real
+            captures) and clips 1 dB below the in-band compression point (-24 dBm at 30 dB).
+        adc_bits: resolution of the converter. 16: all bits of the file carry signal, as in real captures, where the
+            decimation filter has averaged a faster converter. 12: steps of 16 counts.
+        leakage: leakage from the transmitters to the receivers; null: none.
+        mount: static echoes of the radar's housing and mount; null: none. The default is the middle of what
+            `radarsim calibrate` finds in three public captures of two boards: -61, -69 and -75 dB at 0.14, 0.13 and
+            0.25 m.
+        mismatch: gain and phase errors of the channels; null: none.
+        phase_noise: phase noise of the transmitted signal; null: none.
+        if_bandwidth_hz: bandwidth of the IF amplifier, Hz; it limits the beat frequency where no decimation filter
+            does.
+        high_pass: apply the two first-order high-pass stages of the radar configuration.
+        band: response of the decimation filter; null: flat up to `if_bandwidth_hz`, and echoes beyond the maximum
+            range alias.
+        image_rejection_db: image rejection of the I/Q mixer, dB (data sheet: 30 dB); null: no image. The image of beat
+            frequency f is at -f, outside the band of complex-1x sampling, so that only images of near echoes are within
+            `band`.
     """
 
     antenna: Antenna | None

@@ -1,4 +1,4 @@
-"""Scene files: YAML with primitive objects and procedural buildings.
+"""A scene file is YAML: primitive objects, meshes, generated buildings, and objects that move.
 
     name: corner
     objects:
@@ -10,11 +10,11 @@
     moving:
       - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
 
-Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file. An open mesh that is
-the outside of a body has ``solid: true``; otherwise it is a sheet with two sides. `importers` writes such files.
+Lengths are in m, angles in degrees; mesh files are relative to the scene file. An open mesh is a sheet with two sides;
+with ``solid: true`` it is the outside of a body. `radarsim scene import` writes such files from meshes, maps and logs.
 
-A scene can have levels, from mild to severe. The file without them is level 0; each level changes the one before:
-an entry with an existing name (``*`` and ``?`` are wildcards) changes the fields given, any other is added.
+A scene can have levels, from mild to severe. The file without them is level 0; each level changes the one before it. An
+entry with the name of an existing entry (``*`` and ``?`` are wildcards) changes its fields; any other entry is added.
 
     levels:
       - objects: [{name: wall, material: glass}]                                         # level 1
@@ -22,11 +22,10 @@ an entry with an existing name (``*`` and ``?`` are wildcards) changes the field
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1, the default of buildings,
-is typical of rooms in use; 0, the default of scenes without a building, is bare, flat and square. Clutter adds objects
-to the scene (`small_objects`). ``furniture`` is the number of pieces in a building's rooms relative to the usual;
-``materials`` has factors on materials' permittivity and conductivity: ``{wood: {permittivity: 1.1}}``. ``interferers``
-are other radars that transmit in the scene (`interferers`); levels can change and add them, too.
+``clutter`` and ``unevenness`` are the clutter and roughness settings: 1, the default of buildings, is a room in use; 0,
+the default of scenes without a building, is bare, flat and at right angles. Clutter adds small objects to the scene.
+``materials`` has factors on permittivity and conductivity: ``{wood: {permittivity: 1.1}}``. ``interferers`` are other
+radars that transmit in the scene. Levels can change and add interferers, too.
 """
 
 import re
@@ -44,13 +43,14 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from radarize.io.errors import InputError
 from radarize.io.files import within
+from radarize.io.schema import Described
 from radarize.io.yamlfile import read_yaml
 from radarsim.world import plugins, shapes
 from radarsim.world.fields import Length, Name, Strict, Vector
 from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
-from radarsim.world.materials import DIELECTRICS, MATERIALS, Material, constant, decibel, material
+from radarsim.world.materials import DIELECTRICS, MATERIALS, Material, MaterialName, constant, decibel, material
 from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
@@ -72,17 +72,29 @@ class Parts(NamedTuple):
 
 
 class Custom(Strict):
-    """Material of constant permittivity, or a conductor."""
+    """A material of constant permittivity, or a conductor.
+
+    Attributes:
+        permittivity: relative permittivity.
+        conductivity: conductivity, S/m.
+        conductor: a perfect conductor; permittivity and conductivity are not used.
+        roughness: RMS height of the surface, m.
+        sigma0_db: four times the fraction of incident power that is scattered diffusely, dB.
+        directive: fraction of the diffuse power in a lobe around the specular direction.
+        backscatter: fraction of the diffuse power in a lobe back to the source.
+        thickness: thickness of a slab, through which part of the wave is transmitted, m; null: opaque.
+        clear: transparent to light, for the depth camera.
+    """
 
     permittivity: Annotated[float, Field(ge=1)] = 1.0
-    conductivity: Annotated[float, Field(ge=0)] = 0.0  # S/m
+    conductivity: Annotated[float, Field(ge=0)] = 0.0
     conductor: bool = False
-    roughness: Annotated[float, Field(ge=0)] = 0.0  # RMS height, m
-    sigma0_db: float = -60.0  # four times the fraction of power scattered diffusely, dB
-    directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0  # fractions of it in lobes, see Material
+    roughness: Annotated[float, Field(ge=0)] = 0.0
+    sigma0_db: float = -60.0
+    directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     backscatter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     thickness: Length | None = None
-    clear: bool = False  # also transparent to light
+    clear: bool = False
 
     def material(self, name: str) -> Material:
         law = None if self.conductor else constant(self.permittivity, self.conductivity)
@@ -94,16 +106,30 @@ class Custom(Strict):
 
 
 class CustomMaterial(Strict):
+    """A material that the scene file defines.
+
+    Attributes:
+        custom: its properties.
+    """
+
     custom: Custom
 
 
 class Shape(Strict, ABC):
-    """Object of a scene file. A subclass with its own `shape` and `mesh(folder)` can be used in scene files."""
+    """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there.
+
+    Attributes:
+        name: unique name of the object.
+        shape: kind of object.
+        material: name of a material, or {custom: {...}}.
+        position: x, y, z of the centre, m.
+        solid: an open mesh is part of a body's surface and is seen from its outside only; false: it is a sheet.
+    """
 
     name: Name
-    material: str | CustomMaterial
+    material: MaterialName | CustomMaterial
     position: Vector = (0.0, 0.0, 0.0)
-    solid: bool = False  # part of the surface of a body, though open: seen from its outside only
+    solid: bool = False
 
     @abstractmethod
     def mesh(self, folder: Path) -> trimesh.Trimesh:
@@ -120,13 +146,25 @@ class Shape(Strict, ABC):
 
 
 class TurnedShape(Shape):
-    rotation: Vector = (0.0, 0.0, 0.0)  # roll, pitch, yaw in degrees
+    """An object that can be rotated.
+
+    Attributes:
+        rotation: roll, pitch, yaw, degrees.
+    """
+
+    rotation: Vector = (0.0, 0.0, 0.0)
 
     def _placed(self, shape: trimesh.Trimesh) -> trimesh.Trimesh:
         return shapes.placed(shape, self.position, np.deg2rad(self.rotation))
 
 
 class Box(TurnedShape):
+    """A box.
+
+    Attributes:
+        size: extent along x, y, z before rotation, m.
+    """
+
     shape: Literal["box"]
     size: tuple[Length, Length, Length]
 
@@ -135,8 +173,15 @@ class Box(TurnedShape):
 
 
 class Rectangle(Shape):
+    """A rectangle. Its height is vertical; where it lies flat, its height is along y and its width along x.
+
+    Attributes:
+        size: width and height, m.
+        facing: direction of the normal, x, y, z.
+    """
+
     shape: Literal["rectangle"]
-    size: tuple[Length, Length]  # width, height
+    size: tuple[Length, Length]
     facing: Vector
 
     def mesh(self, folder: Path) -> trimesh.Trimesh:
@@ -146,6 +191,14 @@ class Rectangle(Shape):
 
 
 class Cylinder(TurnedShape):
+    """A cylinder along z before rotation.
+
+    Attributes:
+        radius: radius, m.
+        height: height, m.
+        sides: number of facets of its mesh.
+    """
+
     shape: Literal["cylinder"]
     radius: Length
     height: Length
@@ -156,6 +209,13 @@ class Cylinder(TurnedShape):
 
 
 class Sphere(Shape):
+    """A sphere.
+
+    Attributes:
+        radius: radius, m.
+        subdivisions: subdivisions of the icosahedron of its mesh; each multiplies the triangles by four.
+    """
+
     shape: Literal["sphere"]
     radius: Length
     subdivisions: Annotated[int, Field(ge=0, le=6)] = 3
@@ -165,6 +225,13 @@ class Sphere(Shape):
 
 
 class Mesh(TurnedShape):
+    """A mesh from a file.
+
+    Attributes:
+        file: mesh file (.ply, .obj, .stl), relative to the scene file.
+        scale: factor on its coordinates.
+    """
+
     shape: Literal["mesh"]
     file: str
     scale: Length = 1.0
@@ -185,29 +252,60 @@ class Mesh(TurnedShape):
         return self._placed(shapes.mesh(self.scale * vertices, faces))
 
 
-class _Change(BaseModel):
+class Change(Described):
+    """Fields of the entry of that name that change, or a new entry.
+
+    Attributes:
+        name: name of an entry; * and ? are wildcards.
+    """
+
     model_config = ConfigDict(extra="allow", frozen=True)
 
     name: Name
 
 
 class Factors(Strict):
-    """Factors on a material's permittivity and conductivity."""
+    """Factors on the properties of a material.
+
+    Attributes:
+        permittivity: factor on the relative permittivity.
+        conductivity: factor on the conductivity.
+    """
 
     permittivity: Factor = 1.0
     conductivity: Factor = 1.0
 
 
 class Level(Strict):
-    """Changes and additions of one level."""
+    """Changes of one level of severity against the level before it.
 
-    objects: list[_Change] = []
-    moving: list[_Change] = []
-    interferers: list[_Change] = []
+    Attributes:
+        objects: objects that change or are added.
+        moving: movers that change or are added.
+        interferers: radars that change or are added.
+    """
+
+    objects: list[Change] = []
+    moving: list[Change] = []
+    interferers: list[Change] = []
 
 
 class Description(Strict):
-    """A scene file. Requires objects, a building, or both."""
+    """A scene file. It has objects, a building, or both.
+
+    Attributes:
+        name: name of the scene; default: that of the file.
+        objects: objects at rest.
+        building: a generated floor of a building.
+        moving: people, doors and fans.
+        levels: changes per level of severity; level 2 of corner.yaml is the scene corner@2.
+        clutter: density of small objects and fittings, 1 as in rooms in use, 0 none. Default: 1 in buildings, else 0.
+        unevenness: deviation of surfaces from planes and right angles, 1 as in real buildings, 0 none. Default: 1 in
+            buildings, else 0.
+        furniture: number of pieces of furniture in a building, as a fraction of the usual number.
+        materials: factors on the properties of materials, by name.
+        interferers: other radars that transmit in the scene.
+    """
 
     name: str = ""
     objects: list[Shape] = []

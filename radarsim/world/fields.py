@@ -2,7 +2,9 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
+
+from radarize.io.schema import Described
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -10,7 +12,7 @@ Name = Annotated[str, Field(min_length=1)]
 Vector = tuple[Number, Number, Number]
 
 
-class Strict(BaseModel):
-    """Immutable model that rejects unknown fields."""
+class Strict(Described):
+    """Fields that do not change, and no others."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

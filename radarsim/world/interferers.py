@@ -16,6 +16,7 @@ from jaxtyping import Float
 from pydantic import Field, field_validator
 from scipy.spatial.transform import Rotation
 
+from radarize.io.schema import Changes
 from radarize.io.yamlfile import changed
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
@@ -29,17 +30,19 @@ class Interferer(Strict):
     """Interfering radar. Its antennas and transmit power are those of the radar that it disturbs.
 
     Attributes:
-        name: unique name.
-        radar: a preset's name, or fields of `RadarConfig` that differ from the preset `radarize`.
-        position: at time 0 of the motion, m.
-        velocity: m/s.
+        name: unique name of the radar.
+        radar: name of a preset, or the fields of `RadarConfig` in which it differs from the preset `radarize`.
+        position: x, y, z at time 0 of the motion, m.
+        velocity: velocity, m/s.
         yaw: direction of its boresight, degrees.
-        start: start of its first frame, s; it is silent before, and transmits continuously from then on.
-        clock_ppm: frequency offset of its clock relative to that of the radar that it disturbs.
+        start: start of its first frame, s; from then on it transmits frame after frame.
+        clock_ppm: frequency offset of its clock to that of the disturbed radar, ppm.
     """
 
     name: Name
-    radar: RadarConfig = PRESETS["radarize"]
+    radar: Annotated[RadarConfig, Changes(RadarConfig, tuple(PRESETS))] = Field(
+        PRESETS["radarize"], json_schema_extra={"default": "radarize"}
+    )
     position: Vector
     velocity: Vector = (0.0, 0.0, 0.0)
     yaw: Number = 0.0

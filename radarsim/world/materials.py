@@ -21,10 +21,11 @@ lower it by as much at grazing.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Complex, Float
+from pydantic import WithJsonSchema
 
 from radarize.io.errors import InputError
 from radarize.io.yamlfile import read_beside
@@ -201,6 +202,20 @@ def _registered(
 MATERIALS = {name: _registered(name, **about) for name, about in read_beside(__file__).items()}
 #: Names of those that have a permittivity.
 DIELECTRICS = tuple(name for name, each in MATERIALS.items() if not each.conductor)
+
+
+#: A name that `material` accepts; editors suggest the registry's.
+MaterialName = Annotated[
+    str,
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"enum": sorted(MATERIALS)},
+                {"pattern": f"^(itu[ _-])?({'|'.join(name.replace(' ', '[ _-]') for name in sorted(MATERIALS))})$"},
+            ]
+        }
+    ),
+]
 
 
 def material(name: str) -> Material:

@@ -23,7 +23,7 @@ from radarize.io.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.fields import Length, Name, Number, Strict
 from radarsim.world.fields import Vector as Point
-from radarsim.world.materials import Material, material
+from radarsim.world.materials import Material, MaterialName, material
 from radarsim.world.objects import SceneObject
 
 
@@ -78,7 +78,11 @@ class Part:
 class Mover(Strict, ABC):
     """Moving object. A subclass with its own `kind` can be used in scene files.
 
-    Parts without a material share the mover's `cross_section`, m^2; if it is None, they only obstruct.
+    Parts of no material share the mover's `cross_section`, m^2; where it has none, they hide and do not echo.
+
+    Attributes:
+        name: unique name of the mover.
+        kind: type of mover.
     """
 
     name: Name
@@ -98,10 +102,17 @@ class Person(Mover):
     Ten capsules: trunk, head, upper and lower limbs. Hips and shoulders swing as sines at the step frequency,
     knees bend in the swing phase, after the averages of Murray, Drought and Kory (J. Bone Joint Surg. 46-A,
     1964). Cross section: 0 to -8 dBsm is measured for pedestrians at 76 GHz (Yamada, Tanaka and Nishikawa, EuRAD 2005).
+
+    Attributes:
+        cross_section: radar cross section of the whole body, m^2.
+        path: way-points x, y of the polyline, m; one point: the person stands there.
+        speed: walking speed, m/s.
+        height: height of the body, m.
+        floor: z of the floor, m.
     """
 
     kind: Literal["person"] = "person"
-    cross_section: Length = 0.5  # of the whole, spread over its surface, m^2
+    cross_section: Length = 0.5
     path: tuple[tuple[Number, Number], ...] = Field(min_length=1)
     speed: Annotated[float, Field(ge=0, le=3, allow_inf_nan=False)] = 1.0
     height: Annotated[float, Field(gt=0.5, lt=2.5)] = 1.75
@@ -181,16 +192,26 @@ class Person(Mover):
 
 
 class Door(Mover):
-    """Door leaf of a material that swings sinusoidally about a vertical hinge between two angles."""
+    """A leaf of a material that swings about a vertical hinge between two angles, as a sine.
+
+    Attributes:
+        hinge: x, y, z of the hinge at half its height, m.
+        width: width of the leaf, m.
+        height: height of the leaf, m.
+        thickness: thickness of the leaf, m.
+        angles: first and last angle of the leaf from the x axis, degrees.
+        period: period of the swing, s.
+        material: name of the leaf's material.
+    """
 
     kind: Literal["door"] = "door"
     hinge: Point  # at half its height
     width: Length = 0.9
     height: Length = 2.0
     thickness: Length = 0.04
-    angles: tuple[Number, Number] = (0.0, 90.0)  # deg from the x axis
-    period: Length = 4.0  # s
-    material: str = "wood"
+    angles: tuple[Number, Number] = (0.0, 90.0)
+    period: Length = 4.0
+    material: MaterialName = "wood"
 
     @field_validator("material")
     @classmethod
@@ -214,15 +235,25 @@ class Door(Mover):
 
 
 class Fan(Mover):
-    """Blades that rotate about an axis."""
+    """Blades that turn about an axis.
+
+    Attributes:
+        cross_section: radar cross section of all blades, m^2.
+        center: x, y, z of the centre, m.
+        axis: direction of the axis, x, y, z.
+        radius: radius, m.
+        blades: number of blades.
+        pitch: pitch of the blades, degrees.
+        turns_per_second: rotations per second.
+    """
 
     kind: Literal["fan"] = "fan"
-    cross_section: Length = 0.05  # m^2, as a person's
+    cross_section: Length = 0.05
     center: Point
     axis: Point = (0.0, 0.0, 1.0)
     radius: Length = 0.5
     blades: Annotated[int, Field(ge=1, le=12)] = 3
-    pitch: Number = 20.0  # deg
+    pitch: Number = 20.0
     #: Path lengths within a burst are parabolas: exact to 0.1 mm up to about two turns a second at half a metre.
     turns_per_second: Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)] = 1.0
 

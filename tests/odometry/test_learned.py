@@ -169,7 +169,9 @@ def test_increments_of_several_spacings_are_fused(tmp_path):
     path = weights(tmp_path, "rotation")
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        rotation = LearnedRotation(CONFIG, path, TurnConfig(alike=1))  # the errors of the oracle are independent
+        rotation = LearnedRotation(
+            CONFIG, path, TurnConfig(variance_factor=1)
+        )  # the errors of the oracle are independent
         rotation._net = Oracle(times, truth, noise, rng)
         found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
         error = np.cumsum(found.yaw)[-1] - (truth[-1] - truth[0])
@@ -187,7 +189,7 @@ def test_correlated_errors_add_up(tmp_path):
     times = np.arange(count) * CONFIG.frame_period
     nees = []
     for factor in (1, 4):
-        rotation = LearnedRotation(CONFIG, weights(tmp_path, "rotation"), TurnConfig(alike=factor))
+        rotation = LearnedRotation(CONFIG, weights(tmp_path, "rotation"), TurnConfig(variance_factor=factor))
         rotation._net = Oracle(times, 0.98 * np.radians(60) * times, noise, np.random.default_rng(0))
         found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
         error = found.yaw.sum() - np.radians(60) * (times[-1] - times[0])

@@ -1,12 +1,19 @@
-"""All settings in one file: as printed they are the defaults, and an error in a file is reported in one sentence."""
+"""Settings of the pipeline: described fields, `radarize config`, errors of configuration files."""
+
+import re
+from collections.abc import Iterator
 
 import pytest
 import yaml
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from radarize.cli import app
+from radarize.evaluation.benchmark.choices import SETS
 from radarize.io.console import run as command
 from radarize.io.errors import InputError
-from radarize.pipeline.config import Configuration
+from radarize.io.plain import tuned_on, unit_of
+from radarize.pipeline.config import Configuration, summary
 from radarize.pipeline.method import Inputs
 from radarize.pipeline.methods import make_pipeline
 from radarize.radar.presets import PRESETS
@@ -20,6 +27,27 @@ def leaves(section: dict, at: str = "") -> dict[str, object]:
     for name, value in section.items():
         found |= leaves(value, f"{at}{name}.") if isinstance(value, dict) else {f"{at}{name}": value}
     return found
+
+
+def fields(section: BaseModel, at: str = "") -> Iterator[tuple[str, object, FieldInfo]]:
+    """Path, value and field of every setting; each section has a summary."""
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if isinstance(value, BaseModel):
+            assert summary(type(value)), at + name
+            yield from fields(value, f"{at}{name}.")
+        else:
+            yield at + name, value, field
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "field"), [pytest.param(*each, id=each[0]) for each in fields(Configuration())]
+)
+def test_every_setting_has_a_description_and_a_unit(path, value, field):
+    """And sets of recordings that it was tuned on exist."""
+    assert field.description and not field.description.endswith(".")
+    assert bool(unit_of(field)) != isinstance(value, bool)
+    assert set(re.findall(r"\b[A-Z]{4,}\b", tuned_on(field))) - {"NEES", "SLAM"} <= SETS.keys()
 
 
 def test_what_is_printed_is_what_is_meant(tmp_path, capsys):

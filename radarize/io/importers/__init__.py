@@ -65,7 +65,7 @@ def import_recording(
     start_time = float(given.start_time or 0.0)
     if source.resolve() == output.resolve():
         raise InputError(f"{output}: is the source itself, expected another output file")
-    products = _poses(given.poses) if given.poses else {}
+    products = _poses(Path(given.poses)) if given.poses else {}
     format = _format(source, given)
     if given.capture is None and len(several := format.captures(source) if format.captures else ()) > 1:
         return _import_all(source, output, given, len(several), progress)

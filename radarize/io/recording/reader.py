@@ -43,6 +43,11 @@ class Recording:
 
     Raises:
         InputError: missing file, not a recording, or a broken configuration.
+
+    Example:
+        >>> with rz.Recording("walk.h5") as rec:
+        ...     len(rec), rec[4:8].samples.shape  # frame, loop, transmitter, receiver, sample, I and Q
+        (24, (4, 32, 3, 4, 96, 2))
     """
 
     path: Path

@@ -42,11 +42,17 @@ class Calibration:
     """Calibration of a radar, estimated from a recording.
 
     Attributes:
-        config: configuration of the radar with the calibration.
-        errors: (tx, rx, 2) standard errors of gain (dB) and phase (rad) of the enabled channels.
-        values: further quantities by name, SI units; NaN with a reason if not observable.
-        warnings: reasons for a poor estimate.
-        source: a sentence on the recording and method.
+        config: the radar's, calibrated.
+        errors: (tx, rx, 2) standard errors of the channels' gains (dB) and phases (rad), of the enabled channels.
+        values: further quantities by name, SI units; NaN with the reason where they are not observable.
+        warnings: what makes the estimate poor.
+        source: what it was made from, a sentence.
+
+    Example:
+        >>> import numpy as np
+        >>> found = rz.Calibration(rec.config, np.zeros((3, 4, 2)), {}, [], "nominal values")
+        >>> found.board.name, found.gains.shape, found.phases.shape  # dB, rad
+        ('iwr1843boost', (3, 4), (3, 4))
     """
 
     config: RadarConfig

@@ -21,7 +21,12 @@ class Check:
 
     Attributes:
         findings: faults, in the order of the tests.
-        not_observable: kinds of faults that the recording cannot show, with the reason.
+        not_observable: kinds of faults that the recording would not show, and why.
+
+    Example:
+        >>> found = rz.check(rec)
+        >>> found.well, found.warnings()
+        (True, [])
     """
 
     findings: tuple[Finding, ...]

@@ -30,12 +30,12 @@ Part = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class Mounting(Frozen):
-    """Mounting of the sensor on its carrier; values that were not measured are None.
+    """Mounting of the sensor on its carrier; None: not observed.
 
     Attributes:
         height: height above the floor, m.
-        lever_arm: ahead of the carrier's axle, m.
-        yaw: yaw of the sensor relative to the carrier's forward direction, rad, positive to the left.
+        lever_arm: distance ahead of the carrier's axle, m.
+        yaw: yaw to the carrier's forward direction, positive to the left, rad.
         tilt: angle by which the front is raised, rad.
         lean: angle by which the left side is raised, rad.
     """
@@ -56,18 +56,20 @@ class Board(Frozen):
     """Radar board.
 
     Attributes:
-        name: of its file, without the suffix.
-        source: the document that describes the layout.
-        chip: a name of `radarize.radar.boards.chips.CHIPS`, whose bands and limits apply.
-        design_frequency: of the antenna spacings, Hz.
-        tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
-        tx_sign, rx_sign: -1 for antennas fed from the opposite side of the patch, whose signal is turned by 180 deg.
-            Default: none are.
-        platforms: other names of the board in configurations (``% Platform:``, ``mmWaveDevice``).
-        calibration: measured factor per physical (tx, rx) as (re, im) pairs, by which samples are multiplied, including
-            the antennas' signs; None: not measured.
-        range_bias: m, measured minus true range.
-        mounting: mounting of the sensor; None: not measured. For information only.
+        name: name of the board's file without suffix.
+        source: document that describes the layout.
+        chip: name in `radarize.radar.boards.chips.CHIPS`, which has its bands and limits.
+        design_frequency: frequency of the antenna spacings, Hz.
+        tx: positions of the transmit antennas as (left, up) in half wavelengths at the design frequency.
+        rx: positions of the receive antennas, likewise.
+        tx_sign: -1 for a transmit antenna fed from the opposite side of the patch, which turns its phase by 180 deg.
+            Default: 1 for all.
+        rx_sign: the same for receive antennas.
+        platforms: other names of this board in configurations (``% Platform:``, ``mmWaveDevice``).
+        calibration: measured factor per physical (tx, rx) as (re, im) pairs, by which samples are multiplied, signs of
+            the antennas included; None: not measured.
+        range_bias: measured minus true range, m.
+        mounting: mounting of the sensor on its carrier, not used in processing; None: not measured.
         front_end: fields of `radarsim.receiver.frontend_config.FrontEndConfig`, which only the simulator reads.
     """
 

@@ -29,7 +29,14 @@ from radarsim.world.objects import SceneObject
 
 
 class Floor(Strict, ABC):
-    """One floor of a building. The same parameters give bit-identical objects."""
+    """One floor of a building. Same parameters, same objects to the last bit.
+
+    Attributes:
+        kind: style of the building.
+        seed: seed of what all floors share: outline, corridors, stairs.
+        floor: number of the floor, which varies rooms, doors and furniture.
+        furnished: whether rooms have furniture.
+    """
 
     kind: str
     seed: Annotated[int, Field(ge=0)] = 0
@@ -83,14 +90,22 @@ class Building(Floor):
 
 
 class Office(Floor):
-    """A floor of style `office`: a corridor along x between two rows of rooms, of given sizes."""
+    """A floor of style `office`: a corridor along x between two rows of rooms, of given sizes.
+
+    Attributes:
+        length: extent along x, outside to outside, m.
+        depth: extent along y, outside to outside, m.
+        height: floor to ceiling, m.
+        corridor: width of the corridor, m.
+        room: usual width of a room, m.
+    """
 
     kind: Literal["office"] = "office"
-    length: Annotated[float, Field(ge=8, le=200)] = 18.0  # along x, outside to outside, m
-    depth: Annotated[float, Field(ge=8, le=40)] = 12.0  # along y
-    height: Annotated[float, Field(ge=2.4, le=6)] = 2.7  # floor to ceiling
-    corridor: Annotated[float, Field(ge=1.4, le=6)] = 2.0  # width
-    room: Annotated[float, Field(ge=2.8, le=12)] = 4.2  # usual width of a room
+    length: Annotated[float, Field(ge=8, le=200)] = 18.0
+    depth: Annotated[float, Field(ge=8, le=40)] = 12.0
+    height: Annotated[float, Field(ge=2.4, le=6)] = 2.7
+    corridor: Annotated[float, Field(ge=1.4, le=6)] = 2.0
+    room: Annotated[float, Field(ge=2.8, le=12)] = 4.2
 
     @property
     def style(self) -> Style:

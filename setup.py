@@ -1,4 +1,4 @@
-"""Build step that pyproject.toml cannot describe: `scenes/` of the repository is `radarsim/scenes` where it is installed."""
+"""Build step: `scenes/` of the repository is `radarsim/scenes` where it is installed; pyproject.toml cannot do this."""
 
 import shutil
 from pathlib import Path

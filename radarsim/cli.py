@@ -176,7 +176,7 @@ def info(scene: SceneName) -> None:
     settings = loaded.surface_settings
     print(f"clutter: {settings.clutter:g}, unevenness: {settings.unevenness:g}")
     if settings == IDEAL:
-        print("This scene has no clutter; set `clutter: 1` and `unevenness: 1` in its file to add some.")
+        print("This scene has no clutter. To add some: `clutter: 1` and `unevenness: 1`.")
 
 
 @scene_app.command()
@@ -336,7 +336,7 @@ def emulate(
 
 @app.command()
 def schema(
-    name: Annotated[Literal["scene", "dataset", "front-end", "board"], typer.Argument(help="Kind of YAML file.")],
+    name: Annotated[str, typer.Argument(metavar="KIND", help="Of YAML file: scene, dataset, front-end or board.")],
 ) -> None:
     """Print the JSON schema of a kind of YAML file, by which editors complete and check it."""
     import json

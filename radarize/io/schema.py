@@ -7,7 +7,6 @@ from typing import Any
 
 from pydantic import BaseModel, GetJsonSchemaHandler
 from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core import CoreSchema
 
 _SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Example):$", re.MULTILINE)
 _ENTRY = re.compile(r"^    (\w[\w, ]*): (.*(?:\n {8,}.*)*)", re.MULTILINE)
@@ -17,7 +16,7 @@ class Described(BaseModel):
     """Model whose JSON schema has the descriptions of fields in the docstring's section Attributes."""
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         schema = handler(core)
         found = handler.resolve_ref_schema(schema)
         found["description"] = summary(cls)
@@ -78,6 +77,6 @@ class Changes:
     model: type[Described]
     names: tuple[str, ...] = ()
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         fields = {key: value for key, value in inline(self.model, handler).items() if key != "required"}
         return {"anyOf": [{"enum": [*self.names]}, fields]} if self.names else {"allOf": [fields]}

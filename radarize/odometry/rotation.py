@@ -124,12 +124,12 @@ class RotationConfig(Frozen):
         np.radians(0.3), "standard deviation of the yaw of a match with correlation 1", "rad", gt=0
     )
     guided_yaw_noise: float = setting(
-        np.radians(2.4), "the same where a network estimates turns too; larger, because a map that lags in a turn "
+        np.radians(1.6), "the same where a network estimates turns too; larger, because a map that lags in a turn "
         "biases many consecutive matches", "rad", tuned="4 handheld walks of 60 s (of FURNISHED)", gt=0
     )  # fmt: skip
     doubt: float = setting(
-        2.0, "factor on the variance of a network's turn", "1",
-        tuned="4 handheld walks of 60 s (of FURNISHED), heading error over 10 s of 4.0 deg", ge=1
+        3.0, "factor on the variance of a network's turn", "1",
+        tuned="4 handheld walks of 60 s (of FURNISHED), heading error over 10 s of 4.4 deg", ge=1
     )  # fmt: skip
     least_correlation: float = setting(0.15, "minimum correlation of an accepted match", "1", ge=0, lt=1)
     right_angles: bool = setting(

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from pydantic import GetJsonSchemaHandler
-from pydantic_core import CoreSchema
 
 from radarize.io.schema import inline
 from radarsim.world.description import description_model
@@ -18,7 +17,7 @@ OF_SCENE = "clutter", "unevenness", "furniture", "materials", "interferers"
 class Place:
     """A scene, or a generated building with fields of its scene file."""
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         scene = inline(description_model(), handler)["properties"]
         seeds = {
             "description": "first and last seed of several buildings, which are called NAME and the seed",
@@ -36,7 +35,7 @@ class Place:
 class SensorName:
     """A name of `radarsim.sensors.suite.SENSORS`, or all."""
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         from radarsim.sensors.suite import SENSORS
 
         return {"enum": ["all", *SENSORS]}

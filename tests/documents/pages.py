@@ -22,7 +22,7 @@ THEN = tuple(
             ("howto", "import export ros2"),
             ("explain", "simulator odometry slam truth frames"),
             ("", "physics"),
-            ("about", "results limits faq others trials glossary"),
+            ("about", "results limits faq others trials"),
         ),
         (("howto", "python datasets gpu train method compare radarhd sizes troubleshooting"),),
     )

@@ -77,10 +77,11 @@ def test_disturbed_chirps_are_left_out_and_cost_little(tour, share, burst):
 
 
 def test_chirps_left_as_they_are_cost_much(tour, monkeypatch):
-    """Without the correction the error is large, so the test above is meaningful."""
+    """Without the correction the error exceeds the limit of the test above."""
     adc, truth = tour
     monkeypatch.setattr("radarize.signal.disturbance._OFF", np.inf)
-    assert rms(speeds(disturb(adc, 0.05, "sweep")[0])[0] - truth) > 3 * rms(speeds(adc)[0] - truth)
+    left = speeds(disturb(adc, 0.05, "sweep")[0])[0]
+    assert rms(left - truth) > 1.5 * rms(speeds(adc)[0] - truth) + 0.005
 
 
 def test_lost_chirps_have_no_say(tour):

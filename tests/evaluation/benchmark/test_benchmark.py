@@ -98,7 +98,7 @@ def test_what_cannot_run_is_a_dash_with_a_reason(rooms, toys, tmp_path):
     rows = {row["odometry"]: row for row in found.tables[0].rows}
     assert np.isnan(rows["learned"]["ATE m"]) and rows["learned"]["recordings"] == 0
     assert "| learned | 0 | - | - |" in (tmp_path / "odometry.md").read_text()
-    note = next(note for note in found.notes if note.startswith("learned+metre: - on 2 of 2 recordings"))
+    note = next(note for note in found.notes if note.startswith("learned+metre: failed on 2 of 2 recordings"))
     assert "translation.safetensors: does not fit this radar" in note and str(tmp_path) not in note
 
 
@@ -107,7 +107,7 @@ def test_runs_are_done_once(rooms, toys, tmp_path, monkeypatch):
     monkeypatch.setattr("radarize.evaluation.benchmark.runs.run_recording", None)  # would break whatever runs now
     benchmark("odometry", rooms, tmp_path, Options(toys))
     found = benchmark("buildings", rooms, tmp_path, Options(toys))["buildings"]  # B_robot is new
-    assert any("scaled+metre: - on 1 of 3 recordings" in note for note in found.notes)
+    assert any("scaled+metre: failed on 1 of 3 recordings" in note for note in found.notes)
     benchmark("mapping", rooms, tmp_path, Options(toys))
 
 
@@ -162,7 +162,7 @@ def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
     assert all(rest == [2, True] for _, _, *rest in asked)
     assert (tmp_path / "weights" / "building-A" / "translation.safetensors").read_text() == "building-A"
     assert any(note.startswith("building-A: rotation could not be trained") for note in found.notes)
-    assert any("learned+metre: - on 3 of 3" in note for note in found.notes)
+    assert any("learned+metre: failed on 3 of 3" in note for note in found.notes)
     # What needs no network is run once, whatever the split.
     assert sorted(path.name for path in (tmp_path / "runs").glob("*/*")) == ["scaled+metre"] * 3
 
@@ -238,7 +238,7 @@ def test_a_protocol_means_the_same_in_every_table(rooms, toys, tmp_path, monkeyp
             assert [set(table["ATE m"]) for table in tables] == [{value} for value in expected], (name, odometry)
         for table, protocol in zip(BENCHMARKS[name].tables(study), PROTOCOLS.values(), strict=True):
             assert protocol.loops in table.notes
-    assert "Loops are closed for fused, learned, published alone" in PROTOCOLS["paper"].loops
+    assert "Loop closure for fused, learned, published only" in PROTOCOLS["paper"].loops
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
 def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
     """Run a session with the virtual radar, which repeats a recording; return a row of the table."""
     output, config = folder / "live.h5", Replay(path).config
-    (best, _), losses = best_methods(config), Losses()
+    (best, _), losses = best_methods(config), Losses(config.frame_period)
     with emulator(path, folder, "--loop") as board:
         time.sleep(3)  # frames are made ahead
         command = [
@@ -91,10 +91,10 @@ def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
         with subprocess.Popen([*map(str, command)], text=True, **streams) as session:
             url = re.match(r"page: (\S+)", session.stdout.readline())[1]
             with Browser(url, folder / "profile"):
-                output, warnings = session.communicate()
+                printed, warnings = session.communicate()
     with Recording(output) as recording:
         for where, _ in recording.batches(64):
-            losses.add(recording.valid(where.start, where.stop))
+            losses.add(recording.valid(where.start, where.stop), recording.times[where])
     dropped = re.search(r"(\d+) of \d+ frames were dropped", warnings)
     return {
         "odometry, scans": f"{best['odometry']}, {best['scans']}, all together",
@@ -102,7 +102,7 @@ def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
         "dropped": f"{dropped[1] if dropped else 0} of {frames}",
         "not recorded": frames - losses.frames,
         "chirps lost": losses.lost_chirps,
-        "ms a frame": float(re.search(r"frames, (\S+) ms each", output)[1]),
+        "ms a frame": float(re.search(r"frames, (\S+) ms each", printed)[1]),
         "budget, ms": 1e3 * config.frame_period,
     }
 

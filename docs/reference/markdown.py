@@ -3,8 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 
-_SECTION = re.compile(r"^(Args|Attributes|Returns|Raises|Example):\n", re.MULTILINE)
-_ENTRY = re.compile(r"^    ([\w, .*]+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
+from radarize.io.schema import entries, sections
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -30,15 +29,13 @@ def plain(text: str) -> str:
 
 def docstring(text: str) -> str:
     """Return a docstring in Google's style as Markdown: sections as lists, examples as code."""
-    about, *sections = _SECTION.split(text)
+    about, parts = sections(text)
     found = [plain(about.strip())]
-    for name, body in zip(sections[::2], sections[1::2], strict=True):
+    for name, body in parts:
         if name == "Example":
             found.append("```python\n" + "\n".join(line[4:] for line in body.rstrip().splitlines()) + "\n```")
         elif name == "Returns":
             found.append(f"**Returns** {plain(' '.join(body.split()))}")
         else:
-            entries = _ENTRY.findall(body)
-            found.append(f"**{name}**\n")
-            found[-1] += "".join(f"\n- `{names}`: {plain(' '.join(about.split()))}" for names, about in entries)
+            found.append(f"**{name}**\n" + "".join(f"\n- `{names}`: {plain(each)}" for names, each in entries(body)))
     return "\n\n".join(found) + "\n"

@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import BaseModel, GetJsonSchemaHandler
 from pydantic.json_schema import GenerateJsonSchema
 
-_SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Example):$", re.MULTILINE)
-_ENTRY = re.compile(r"^    (\w[\w, ]*): (.*(?:\n {8,}.*)*)", re.MULTILINE)
+_SECTION = re.compile(r"^(Args|Attributes|Returns|Raises|Example):\n", re.MULTILINE)
+_ENTRY = re.compile(r"^    ([\w, .*]+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 
 
 class Described(BaseModel):
@@ -43,7 +43,7 @@ def json_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
 
 def summary(model: type) -> str:
     """Return a class's docstring up to its first section, in one line."""
-    return " ".join(_SECTION.split(inspect.getdoc(model) or "")[0].split())
+    return " ".join(sections(inspect.getdoc(model) or "")[0].split())
 
 
 def attributes(model: type) -> dict[str, str]:
@@ -52,12 +52,22 @@ def attributes(model: type) -> dict[str, str]:
     for each in reversed(model.__mro__):
         if each.__module__.startswith("pydantic") or each is object or not each.__doc__:
             continue
-        sections = _SECTION.split(inspect.cleandoc(each.__doc__))
-        for name, text in zip(sections[1::2], sections[2::2], strict=True):
+        for name, body in sections(inspect.cleandoc(each.__doc__))[1]:
             if name == "Attributes":
-                for names, about in _ENTRY.findall(text):
-                    found |= dict.fromkeys(names.split(", "), " ".join(about.split()).removesuffix("."))
+                for names, about in entries(body):
+                    found |= dict.fromkeys(names.split(", "), about.removesuffix("."))
     return found
+
+
+def sections(docstring: str) -> tuple[str, list[tuple[str, str]]]:
+    """Return the text before the first section of a docstring in Google's style, and name and body of each section."""
+    about, *parts = _SECTION.split(docstring)
+    return about, list(zip(parts[::2], parts[1::2], strict=True))
+
+
+def entries(body: str) -> list[tuple[str, str]]:
+    """Return names and description of each entry of a section such as Args, descriptions in one line."""
+    return [(names, " ".join(about.split())) for names, about in _ENTRY.findall(body)]
 
 
 def inline(model: type[Described], handler: GetJsonSchemaHandler) -> dict[str, Any]:

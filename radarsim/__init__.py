@@ -1,4 +1,4 @@
-"""Ray-traced simulation of the IWR1843 radar in indoor meshes, written as raw int16 I/Q.
+"""Ray-traced simulation of TI mmWave radars in indoor meshes, written as raw int16 I/Q.
 
 import radarsim
 

@@ -9,7 +9,7 @@ from radarize.io.console import new_app, print_table, progress, run, working
 from radarize.io.errors import InputError
 from radarize.io.plugins import Plugins
 
-app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
+app = new_app("Ray-traced simulation of TI mmWave radars in indoor scenes, as raw int16 I/Q.")
 scene_app = typer.Typer(help="Show, import and export scenes.", no_args_is_help=True)
 app.add_typer(scene_app, name="scene")
 

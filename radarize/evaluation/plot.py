@@ -39,7 +39,7 @@ def plot(
         The axes.
 
     Raises:
-        InputError: another type, maps of several frames, or a recording without truth.
+        InputError: another type, maps of several frames, one row of a map over azimuth, or a recording without truth.
 
     Example:
         >>> axes = rz.plot(rz.range_azimuth(rec[4]), title="frame 4")
@@ -65,7 +65,7 @@ def plot(
 
 
 def _array(axes: "Axes", array: xarray.DataArray, title: str, velocity: Any) -> None:
-    if array.ndim == 3 and array.sizes["frame"] == 1:
+    if array.ndim == 3 and array.sizes.get("frame") == 1:
         array = array[0]
     values = array.values
     match array.dims:
@@ -81,11 +81,12 @@ def _array(axes: "Axes", array: xarray.DataArray, title: str, velocity: Any) -> 
         case ("range",):
             axes.plot(array.range, 10 * np.log10(np.maximum(values, values.max(initial=1e-30) * 1e-9)))
             axes.set(xlabel="range, m", ylabel="power, dB of squared ADC counts", title=title)
-        case ("time", "azimuth") | ("azimuth",):
+        case ("time", "azimuth") | ("azimuth",) if array.name != "power":  # scans
             ahead, left = array * np.cos(array.azimuth), array * np.sin(array.azimuth)
             axes.plot(-left.values.ravel(), ahead.values.ravel(), ".", markersize=2)
             axes.set(xlabel="to the right, m", ylabel="forward, m", aspect="equal", title=title)
         case _:
+            one = "maps[0]" if "frame" in array.dims else "range_azimuth(rec[10]), which has no axis frame to select"
             raise InputError(
-                f"axes are {', '.join(map(str, array.dims))}, expected a map of one frame, such as maps[0]"
+                f"axes are {', '.join(map(str, array.dims)) or 'none'}, expected a map of one frame, such as {one}"
             )

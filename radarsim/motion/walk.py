@@ -16,6 +16,8 @@ from radarsim.motion.waypoints import read_waypoints
 from radarsim.world.scene import Scene
 
 _TOUR = 40.0  # s, default duration of a tour
+_RATE = 50.0  # Hz, at which a walk is compared with its way-points
+_NEAR = 0.1  # m, within which the carrier passes a way-point: its path is smooth, and sways with the gait
 
 
 @dataclass(frozen=True)
@@ -55,9 +57,31 @@ class Walk:
         if self.trajectory is not None:
             motion = motion_from_tum(self.trajectory, self.mounting)
         else:
-            places = self.waypoints
-            places = read_waypoints(places) if isinstance(places, (str, Path)) else places
+            places = self._places
             length = _TOUR if self.duration is None and places is None else self.duration
             motion = plan_motion(scene, self.platform, length, keyed_rng(seed, "route"), places, self.mounting)
             motion = vibrating(motion, PLATFORMS[self.platform].vibration, keyed_rng(seed, "vibration"))
         return motion if self.duration is None else motion.until(self.duration)
+
+    def unreached(self, motion: Motion) -> str:
+        """Describe in one sentence the first way-point that a motion `through` them ends before; empty if there is
+        none."""
+        places = self._places
+        if places is None or self.duration is None:
+            return ""
+        times = np.arange(0, motion.path.x[-1], 1 / _RATE)  # the path goes on after the motion's end
+        path, last = motion.path(times)[:, :2], 0
+        for number, (x, y) in enumerate(places, 1):
+            distance = np.hypot(*(path[last:] - [x, y]).T)
+            last += int(np.argmax(distance <= max(_NEAR, distance.min())))
+            if times[last] > motion.duration:
+                return (
+                    f"the walk of {motion.duration:g} s ends before way-point {number} of {len(places)} (x {x:.2f}, "
+                    f"y {y:.2f} m), which is reached after {times[last]:.1f} s; without a duration it ends at the last one"
+                )
+        return ""
+
+    @property
+    def _places(self) -> Float[np.ndarray, "n 2"] | None:
+        places = self.waypoints
+        return read_waypoints(places) if isinstance(places, (str, Path)) else places

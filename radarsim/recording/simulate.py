@@ -94,7 +94,9 @@ def planned(
     motion = way.through(walk_in or world, seed)
     world = with_pedestrians(world, motion, people, seed)
     scenario = Scenario(world, motion, config, settings, seed, names)
-    about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
+    about: dict[str, object] = {"platform": "trajectory" if way.trajectory is not None else way.platform}
+    if unreached := way.unreached(motion):
+        about["warnings"] = "; ".join(filter(None, (unreached, crossings(motion, world))))
     return scenario, cfg_text, about | ({"people": people} if people else {})
 
 

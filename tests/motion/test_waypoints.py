@@ -8,6 +8,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS
+from radarsim.motion.walk import Walk
 from radarsim.motion.waypoints import read_waypoints
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
@@ -66,6 +67,23 @@ def test_goes_through_doors(office, rooms):
 def test_ends_when_asked(office):
     motion = plan_motion(office, "cart", 3.0, np.random.default_rng(0), np.array(PLACES))
     assert motion.duration == 3.0
+
+
+@pytest.mark.parametrize("platform", list(PLATFORMS))
+def test_the_first_way_point_not_reached_is_named(office, platform):
+    """None of a walk that ends at the last one; of one that ends just before a place is passed, this place."""
+    whole = Walk(platform, waypoints=np.array(PLACES)).through(office, seed=0)
+    times = np.arange(0, whole.duration, 0.02)
+    second = times[np.linalg.norm(whole.path(times)[:, :2] - PLACES[1], axis=1).argmin()]
+    for duration, words in (
+        (None, ""),
+        (whole.duration, ""),
+        (second + 1, "ends before way-point 3 of 4 (x 9.50, y 6.00 m)"),
+        (second - 1, "ends before way-point 2 of 4 (x 7.00, y 6.20 m)"),
+    ):
+        walk = Walk(platform, duration, waypoints=np.array(PLACES))
+        found = walk.unreached(walk.through(office, seed=0))
+        assert words in found and bool(words) == bool(found)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +157,8 @@ def test_the_recording_describes_its_motion(tmp_path):
     (tmp_path / "way.csv").write_text("0 0\n1 0.5\n")
     typed = ["simulate", "physics/room", "-o", str(tmp_path / "a.h5"), "--waypoints", str(tmp_path / "way.csv")]
     result = CliRunner().invoke(app, [*typed, "--duration", "0.1", "--mounting", "0.1 0 0 0 0 0"], prog_name="radarsim")
-    assert result.exit_code == 0 and "m in 0.1 s, mean" in result.stdout and "warning" not in result.stdout
+    assert result.exit_code == 0 and "m in 0.1 s, mean" in result.stdout
+    assert "warning: the walk of 0.1 s ends before way-point 2 of 2 (x 1.00, y 0.50 m)" in result.stdout
     (tmp_path / "wall.tum").write_text("".join(f"{t} 0 {1 + 15 * t} 1 0 0 0 1\n" for t in (0.0, 0.05, 0.1, 0.15)))
     path = simulate("physics/room", tmp_path / "b.h5", trajectory=tmp_path / "wall.tum", duration=0.1)
     with Recording(path) as recording:

@@ -27,7 +27,10 @@ _SECTIONS = {
     ),
     "Pipeline and plug-ins": (
         "radarize.pipeline.pipeline.Pipeline", "radarize.pipeline.methods.make_pipeline",
-        "radarize.pipeline.method.Method", "radarize.io.importers.format.Format", "radarize.slam.backend.Slam",
+        "radarize.pipeline.method.Method", "radarize.pipeline.method.Inputs",
+        "radarize.pipeline.pipeline.ScanExtractor", "radarize.pipeline.pipeline.OdometryEstimator",
+        "radarize.odometry.integration.Track", "radarize.odometry.uncertainty.ErrorModel",
+        "radarize.io.importers.format.Format", "radarize.slam.backend.Slam",
         "radarize.pipeline.runfolder.RunFolder", "radarize.pipeline.runfolder.OccupancyMap",
         "radarize.evaluation.evaluate.evaluate",
     ),

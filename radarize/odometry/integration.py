@@ -1,6 +1,7 @@
 """Planar odometry: velocities at burst centres and yaw increments between them, integrated to a trajectory."""
 
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Protocol
 
 import numpy as np
@@ -76,6 +77,33 @@ class Track:
     velocity_seen: Bool[np.ndarray, "frame"]
     turn_seen: Bool[np.ndarray, "frame"]
     errors: ErrorModel
+
+    @classmethod
+    def from_rates(
+        cls,
+        time: Float[np.ndarray, "frame"],
+        rates: Float[np.ndarray, "frame 3"],
+        covariance: Float[np.ndarray, "frame 3 3"],
+        previous: "Track | None" = None,
+    ) -> "Track":
+        """Integrate velocities and yaw rates to poses. Errors of different frames count as independent.
+
+        Args:
+            time: burst centres, s.
+            rates: velocity forward and left, m/s, and yaw rate, rad/s, since the previous frame, in the sensor frame.
+            covariance: covariance of the rates.
+            previous: track of the frames before; None: these are the first ones, and the first pose is the origin.
+
+        Raises:
+            InputError: time stamps do not increase.
+        """
+        dt = intervals(time, None if previous is None else previous.time[-1])
+        dt[0] *= previous is not None
+        step = np.stack([exponential(t * rate[:2], t * rate[2]) for t, rate in zip(dt, rates, strict=True)])
+        start = np.zeros(3) if previous is None else previous.pose[-1]
+        pose = np.stack([*accumulate(step, compose, initial=start)][1:])
+        seen, errors = np.ones(len(time), bool), ErrorModel.independent(dt[:, None, None] ** 2 * covariance)
+        return cls(time, pose, step, rates[:, :2], covariance[:, :2, :2], seen, seen, errors)
 
 
 class VelocityConfig(Frozen):

@@ -7,8 +7,8 @@ recordings are not checked.
 from collections.abc import Iterator
 
 from radarize.io.errors import InputError
-from radarize.radar.boards import load_board
-from radarize.radar.boards.chips import CHIPS
+from radarize.radar.boards import Board, load_board
+from radarize.radar.boards.chips import CHIPS, Chip
 from radarize.radar.config import RadarConfig
 
 MIN_CHIRP = 15e-6
@@ -34,16 +34,36 @@ def check_limits(config: RadarConfig, demo: bool = False) -> None:
         raise InputError(f"radar configuration: {message}")
 
 
+def covers(board: Board, start_frequency: float) -> bool:
+    """Whether a band of the board's chip contains the start frequency, Hz."""
+    slack = _SWEEP_TOLERANCE
+    return any(low - slack <= start_frequency <= high + slack for low, high in CHIPS[board.chip].bands)
+
+
+def outside_band(config: RadarConfig) -> str:
+    """Describe in one sentence that the board does not have the start frequency; empty if it has."""
+    board = load_board(config.board)
+    if covers(board, config.start_frequency):
+        return ""
+    return (
+        f"chirps start at {config.start_frequency / 1e9:g} GHz, but the {board} has {_bands(CHIPS[board.chip])}, so "
+        "positions of antennas may be wrong"
+    )
+
+
+def _bands(chip: Chip) -> str:
+    return " or ".join(f"{low / 1e9:g}-{high / 1e9:g} GHz" for low, high in chip.bands)
+
+
 def _violations(config: RadarConfig, demo: bool) -> Iterator[str]:
     name = load_board(config.board).chip
     chip = CHIPS[name]
     start, sweep = config.start_frequency, config.slope * config.ramp_end_time
     slack = _SWEEP_TOLERANCE
     if not any(low - slack <= start and start + sweep <= high + slack for low, high in chip.bands):
-        bands = " or ".join(f"{low / 1e9:g}-{high / 1e9:g} GHz" for low, high in chip.bands)
         yield (
             f"start_frequency, slope and ramp_end_time sweep {start / 1e9:.3f}-{(start + sweep) / 1e9:.3f} GHz, "
-            f"expected wholly within {bands} on the {name}"
+            f"expected wholly within {_bands(chip)} on the {name}"
         )
     if sweep > chip.max_sweep + slack:
         yield f"slope x ramp_end_time is {sweep / 1e9:.3f} GHz, expected at most {chip.max_sweep / 1e9:g} GHz"

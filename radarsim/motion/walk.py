@@ -71,13 +71,13 @@ class Walk:
             return ""
         times = np.arange(0, motion.path.x[-1], 1 / _RATE)  # the path goes on after the motion's end
         path, last = motion.path(times)[:, :2], 0
-        for number, (x, y) in enumerate(places, 1):
+        for number, (x, y) in enumerate(places[1:], 2):
             distance = np.hypot(*(path[last:] - [x, y]).T)
             last += int(np.argmax(distance <= max(_NEAR, distance.min())))
             if times[last] > motion.duration:
                 return (
                     f"the walk of {motion.duration:g} s ends before way-point {number} of {len(places)} (x {x:.2f}, "
-                    f"y {y:.2f} m), which is reached after {times[last]:.1f} s; without a duration it ends at the last one"
+                    f"y {y:.2f} m), reached after {times[last]:.1f} s; without a duration it ends at the last one"
                 )
         return ""
 

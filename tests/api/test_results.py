@@ -202,7 +202,7 @@ def test_notebooks_show_pictures_and_tables(rec, walk):
         (lambda rec: rz.point_cloud("missing.h5"), "missing.h5: no such file"),
         (lambda rec: rz.plot(3), "int cannot be drawn"),
         (lambda rec: rz.plot(rz.range_azimuth(rec[:2])), "axes are frame, range, azimuth, expected a map of one frame"),
-        (lambda rec: rz.plot(rz.range_azimuth(rec[4])[0]), "axes are azimuth, expected a map of one frame, such as range_"),
+        (lambda rec: rz.plot(rz.range_azimuth(rec[4])[0]), "axes are azimuth, expected a map of one frame, such as"),
         (lambda rec: rz.plot(rz.doppler_azimuth(rec[4])[0]), "axes are azimuth, expected a map of one frame"),
         (lambda rec: rz.plot(rz.range_doppler(rec[4])[0]), "axes are doppler, expected a map of one frame"),
         (lambda rec: rz.odometry(rec, "magic"), "odometry is 'magic', expected one of doppler"),

@@ -1,4 +1,4 @@
-"""A third-party package, installed by pip: its method and its format are found without a change of our files."""
+"""A third-party package, installed by pip: its methods and its format are found without a change of our files."""
 
 import os
 import shutil
@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarize.io.recording import Recording
+from radarize.io.recording import Recording, RecordingWriter
+from radarize.io.tum import read_tum
 from radarize.pipeline.runfolder import RunFolder
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
@@ -58,6 +59,30 @@ def test_its_format_is_read_and_its_method_runs(radarize, words, tmp_path):
     ahead = np.abs(BEARINGS).argmin()
     assert RunFolder(tmp_path / "run").scans["ranges"][:, ahead] == pytest.approx(3.0, abs=0.1)
     assert "nearby" in radarize("run", "--help").stdout
+
+
+def test_its_odometry_runs(radarize, tmp_path):
+    """A radar that moves at 0.6 m/s forward and 0.3 m/s to the left, among 25 points 3 m around it."""
+    config = PRESETS["radarize"]
+    stamps, angles = np.arange(8) * config.frame_period, np.radians(np.arange(-60, 61, 5))
+    move = lambda t: (t[..., None] * [0.6, 0.3, 0.0], np.zeros(t.shape))  # noqa: E731
+    points = 3 * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(25)])
+    frames = record(config, move, points, np.full(25, 300.0), stamps, np.random.default_rng(0), noise=3.0)
+    with RecordingWriter(tmp_path / "moving.h5", config) as writer:
+        writer.append(frames, stamps)
+    arguments = "run", tmp_path / "moving.h5", "-o", tmp_path / "run", "--odometry", "straight", "--scans", "nearby"
+    done = radarize(*arguments)
+    assert done.returncode == 0, done.stderr
+    velocity = RunFolder(tmp_path / "run").scans["velocity"]
+    assert velocity.mean(axis=0) == pytest.approx([0.6, 0.3], abs=0.06)
+    time, pose = read_tum(tmp_path / "run" / "odometry.tum")
+    assert pose[-1, :2] == pytest.approx(velocity.mean(axis=0) * (time[-1] - time[0]), abs=0.005)
+
+
+def test_the_how_to_quotes_its_odometry():
+    text = (PLUGIN / "nearby" / "odometry.py").read_text()
+    quoted = text[text.index("class ") : text.index("METHOD")].strip()
+    assert quoted in (PLUGIN.parents[1] / "docs" / "howto" / "method.md").read_text()
 
 
 def test_without_it_both_are_refused(radarize, words, tmp_path):

@@ -154,11 +154,11 @@ def test_the_recording_describes_its_motion(tmp_path):
     """Statistics of a recording: through way-points on the command line, cut short; and along poses through a wall."""
     from radarsim.cli import app
 
-    (tmp_path / "way.csv").write_text("0 0\n1 0.5\n")
+    (tmp_path / "way.csv").write_text("-1.5 0\n1.5 0.5\n")
     typed = ["simulate", "physics/room", "-o", str(tmp_path / "a.h5"), "--waypoints", str(tmp_path / "way.csv")]
     result = CliRunner().invoke(app, [*typed, "--duration", "0.1", "--mounting", "0.1 0 0 0 0 0"], prog_name="radarsim")
     assert result.exit_code == 0 and "m in 0.1 s, mean" in result.stdout
-    assert "warning: the walk of 0.1 s ends before way-point 2 of 2 (x 1.00, y 0.50 m)" in result.stdout
+    assert "warning: the walk of 0.1 s ends before way-point 2 of 2 (x 1.50, y 0.50 m)" in result.stdout
     (tmp_path / "wall.tum").write_text("".join(f"{t} 0 {1 + 15 * t} 1 0 0 0 1\n" for t in (0.0, 0.05, 0.1, 0.15)))
     path = simulate("physics/room", tmp_path / "b.h5", trajectory=tmp_path / "wall.tum", duration=0.1)
     with Recording(path) as recording:

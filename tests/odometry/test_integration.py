@@ -294,3 +294,23 @@ def test_the_prior_of_velocity_is_the_configured_one(fastest):
     found = VelocityFilter(VelocityConfig(fastest=fastest)).filter(np.zeros(1), measured)
     assert found.covariance[0] == pytest.approx(fastest**2 / 2 * np.eye(2))
     assert found.velocity[0] == pytest.approx([0.5, 0.0])
+
+
+def test_rates_are_integrated_to_a_circle():
+    """Constant speed and yaw rate over an uneven clock, in batches of any size; errors are those of the last step."""
+    rng = np.random.default_rng(0)
+    times = 7.0 + np.cumsum(rng.uniform(0.02, 0.05, 40))
+    speed, yaw_rate = 0.8, 0.5
+    rates, covariance = np.tile([speed, 0.0, yaw_rate], (40, 1)), np.tile(np.diag([0.04, 0.09, 0.01]), (40, 1, 1))
+    parts, last = [], None
+    for start, stop in ((0, 1), (1, 15), (15, 40)):
+        last = Track.from_rates(times[start:stop], rates[start:stop], covariance[start:stop], last)
+        parts.append(last)
+    pose, turn = np.concatenate([part.pose for part in parts]), yaw_rate * (times - times[0])
+    circle = speed / yaw_rate * np.column_stack([np.sin(turn), 1 - np.cos(turn)])
+    assert pose == pytest.approx(np.column_stack([circle, turn]), abs=1e-9)
+    found = ErrorModel.joined([part.errors for part in parts])
+    assert (found.noise[0] == 0).all()
+    assert found.noise[1:] == pytest.approx(np.diff(times)[:, None, None] ** 2 * covariance[1:])
+    with pytest.raises(InputError, match="expected ascending times"):
+        Track.from_rates(times[:5], rates[:5], covariance[:5], last)

@@ -1,1 +1,1 @@
-"""A method and a file format of one's own."""
+"""Scans, odometry and a file format of one's own."""

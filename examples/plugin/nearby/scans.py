@@ -17,7 +17,7 @@ class NearbyScans:
         self.heatmaps = inputs.signal.heatmaps
 
     def extract(self, batch: Batch) -> np.ndarray:
-        """Ranges (frame, bearing), m."""
+        """Ranges (frame, bearing), m; inf would be no echo."""
         power = self.heatmaps.range_azimuth_of(batch.spectrum, "capon").numpy()  # (frame, range, azimuth)
         ranges = self.heatmaps.ranges
         weighed = power * np.where(ranges >= LEAST, ranges, 0.0)[:, None] ** 4

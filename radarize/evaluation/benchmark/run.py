@@ -37,7 +37,8 @@ def benchmark(
             index.html; ``runs``, ``timings`` and ``weights``, which are used again.
         options: methods, networks and protocol.
         progress: called with (frames done, frames in all).
-        log: called with a line for each benchmark that the data is not suitable for.
+        log: called with a line for each benchmark that the data is not suitable for, and for each that does not compare
+            all requested methods.
 
     Returns:
         Results by name.
@@ -62,6 +63,9 @@ def benchmark(
             if name != ALL:
                 raise
             log(f"{each}: left out, {error}")
+        else:
+            for words in studies[each].left_out:
+                log(f"{each}: {words}")
     if not studies:
         raise InputError(f"{data}: is not suitable for any benchmark")
     carry_out(list(studies.values()), progress)

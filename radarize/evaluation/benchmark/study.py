@@ -277,7 +277,7 @@ class Study:
             self.data.data([self.timings[0].case] if self.benchmark.timed else self.cases),
             self.used,
             self.options.command,
-            [*splits, *self.shortfalls],
+            [*splits, *self.left_out, *self.shortfalls],
         )
 
     @property
@@ -285,6 +285,13 @@ class Study:
         """Networks that were used."""
         found = [one for networks in self.networks.values() for one in networks.used(self.kinds)]
         return tuple(dict.fromkeys(found))
+
+    @property
+    def left_out(self) -> list[str]:
+        """Sentence on requested methods that are in none of the pairs."""
+        compared = {name for pair in self.pairs for name in (pair.odometry, pair.scans)}
+        rest = [name for name in self.options.methods if name not in compared]
+        return [f"Requested methods that this benchmark does not compare: {', '.join(rest)}."] if rest else []
 
     @property
     def shortfalls(self) -> list[str]:

@@ -24,6 +24,7 @@ from radarize.radar.array import losses
 from radarize.radar.cfg import assumed_board, remarks
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import range_balance
+from radarize.radar.limits import outside_band
 
 __all__ = ["Given", "captures", "import_recording"]
 
@@ -113,11 +114,15 @@ def import_recording(
 
 
 def _of_the_radar(capture: Capture, given: Given) -> list[str]:
-    """Return a warning about an assumed board, and remarks on losses due to the firing order."""
+    """Return warnings about a board of another band and an assumed board, and remarks on losses due to the firing
+    order."""
+    outside = outside_band(capture.config)
+    found = [f"{outside}: --board sets another one"] if outside else []
     if given.overrides.get("board") is not None:
-        return losses(capture.config)
-    unnamed = not capture.cfg_text and given.config is None and not capture.board_known
-    return [*([assumed_board(capture.config)] if unnamed else []), *remarks(capture.cfg_text, capture.config)]
+        return [*found, *losses(capture.config)]
+    if not capture.cfg_text and given.config is None and not capture.board_known:
+        found.append(assumed_board(capture.config))
+    return [*found, *remarks(capture.cfg_text, capture.config)]
 
 
 def captures(source: Path, given: Given) -> Sequence[str]:

@@ -2,9 +2,8 @@
 
 An echo is a plane wave over the virtual array. If antennas are exchanged it is none, and no direction explains the
 channels: in furnished rooms a third to a half of the cells are single plane waves (90 % of their power) with the
-    correct
-array, at most half as many with any other. The test compares cell by cell how well the configured array and another one
-explain it.
+correct array, at most half as many with any other. The test compares cell by cell how well the configured array and
+another one explain it.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,8 +18,9 @@ from radarize.pipeline.check.finding import Correction, Finding, NotObservable
 from radarize.pipeline.check.levels import sureness
 from radarize.pipeline.check.orientation import mirrored
 from radarize.pipeline.check.planewaves import PlaneWaves, Reading, fit_plane_waves
-from radarize.radar.boards import BOARDS, load_board
+from radarize.radar.boards import BOARDS, Board, likely_board, load_board
 from radarize.radar.config import RadarConfig, fired, firing_name
+from radarize.radar.limits import covers, outside_band
 
 #: Standard deviations by which another array must explain the cells better; minimum number of cells and of frames.
 _SIGMAS, _CELLS, _FRAMES = 6.0, 150, 8
@@ -89,16 +89,13 @@ def candidates(config: RadarConfig) -> Iterator[Candidate]:
         yield Candidate(
             "receiver order", wrong, "reorder the receivers' axis", Reading.of(config, rx=order), correction
         )
-    band = config.start_frequency > _BAND
-    for name, board in BOARDS.items():
-        if (board.design_frequency > _BAND) != band or _same_array(config, name):
-            continue
+    for names in _other_boards(config):
         try:
-            other = config.changed("check", board=name)
+            other = config.changed("check", board=names[0])
         except InputError:
             continue
-        words = f"channels fit the {name}, not the {load_board(config.board)}"
-        yield Candidate("board", words, f"import it with --board {name}", Reading.of(other), Correction(other))
+        words = f"the antennas of the {names[0]} instead of those of the {load_board(config.board)}"
+        yield Candidate("board", words, _import_with(names), Reading.of(other), Correction(other))
 
 
 def _orders(count: int) -> list[tuple[int, ...]]:
@@ -114,9 +111,43 @@ def _taken(axis: int, order: list[int]) -> Callable[[np.ndarray], np.ndarray]:
     return lambda frames: np.ascontiguousarray(np.take(frames, order, axis=axis))
 
 
-def _same_array(config: RadarConfig, name: str) -> bool:
-    one, other = load_board(config.board), load_board(name)
-    return (one.tx, one.rx, one.tx_sign, one.rx_sign) == (other.tx, other.rx, other.tx_sign, other.rx_sign)
+def _other_boards(config: RadarConfig) -> list[list[str]]:
+    """Return the boards of the band whose array is another one, grouped by equal arrays; the likeliest comes first."""
+    configured, groups = _array(load_board(config.board)), dict[tuple, list[str]]()
+    high = config.start_frequency > _BAND
+    for name in sorted(BOARDS, key=lambda name: _unlikely(name, config)):
+        if (BOARDS[name].design_frequency > _BAND) == high and (array := _array(BOARDS[name])) != configured:
+            groups.setdefault(array, []).append(name)
+    return list(groups.values())
+
+
+def _array(board: Board) -> tuple:
+    return board.tx, board.rx, board.tx_sign, board.rx_sign
+
+
+def _unlikely(name: str, config: RadarConfig) -> tuple[bool, bool]:
+    """Sort key of boards: first those of the configuration's frequency, of these the most common one."""
+    return not covers(BOARDS[name], config.start_frequency), name != likely_board(config.start_frequency)
+
+
+def _import_with(names: list[str]) -> str:
+    """Remedy that names a board and those with the same antennas."""
+    first, *others = names
+    same = f" (the same antennas: {', '.join(others)})" if others else ""
+    return f"import it with --board {first}{same}"
+
+
+def band(evidence: Evidence) -> Iterator[Finding]:
+    """Find a board that does not have the start frequency. Another one with the same antennas corrects it."""
+    config = evidence.config
+    if outside := outside_band(config):
+        names = [name for name in BOARDS if covers(BOARDS[name], config.start_frequency)]
+        names.sort(key=lambda name: _unlikely(name, config))
+        if same := [name for name in names if _array(BOARDS[name]) == _array(load_board(config.board))]:
+            yield Finding("board", outside, 1.0, _import_with(same), Correction(config.changed("check", board=same[0])))
+        else:
+            wanted = f"the board that was used, such as {', '.join(names)}" if names else "the file of the board"
+            yield Finding("board", outside, 1.0, f"import it with --board and {wanted}")
 
 
 def plane_waves(evidence: Evidence) -> PlaneWaves:

@@ -49,6 +49,7 @@ TESTS = (
     Test(disturbance.interference, ("interference",)),
     Test(disturbance.leakage, ("range bias",)),
     Test(orientation.standing, ("no motion",)),
+    Test(array.band, ("board",)),
     Test(array.antennas, ("transmitter order", "receiver order", "board"), unless=STILL),
     Test(array.elevation, ("elevation missing",), unless=STILL),
     Test(sequence.shuffled, ("frames shuffled",), unless=STILL, whole=True),

@@ -24,6 +24,7 @@ from radarize.io.console import run as command_line
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.pipeline.methods import ODOMETRY, SCANS
+from radarize.pipeline.run import Run
 from tests.evaluation.benchmark import toys as toy_file
 from tests.evaluation.benchmark.rooms import ROOMS, write_room, write_rooms
 from tests.evaluation.benchmark.toys import add
@@ -306,14 +307,32 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
         benchmark("ablation", rooms, tmp_path, Options(["learned", "segmentation"]))
 
 
-def test_the_how_tos_method_runs(rooms, tmp_path, monkeypatch):
+def test_the_how_tos_methods_run(rooms, tmp_path, monkeypatch):
     text = (Path(__file__).parents[3] / "docs" / "howto" / "method.md").read_text()
-    code = next(block for block in re.findall("```python\n(.*?)```", text, re.S) if "class Wall" in block)
     monkeypatch.setitem(SCANS, "wall", SCANS["cfar"])  # so that it is taken out again
-    code = code.replace('"small"', repr(str(rooms))).replace('"tables"', repr(str(tmp_path)))
-    exec(compile(code, "method.md", "exec"), {})
+    monkeypatch.setitem(ODOMETRY, "straight", ODOMETRY["doppler"])
+    for name, path in (
+        ("small", rooms),
+        ("tables", tmp_path),
+        ("walk.h5", rooms / "A_cart.h5"),
+        ("MINE", tmp_path / "M"),
+    ):
+        text = text.replace(f'"{name}"', repr(str(path)))
+    wall, straight = re.findall("```python\n(.*?)```", text, re.S)
+    exec(compile(wall, "method.md", "exec"), {})
+    exec(compile(straight, "method.md", "exec"), {})
+    assert Run(tmp_path / "M").methods == {"odometry": "straight", "scans": "first-echo"}
     rows = json.loads((tmp_path / "mapping.json").read_text())["tables"][0]["rows"][-2:]
     assert [row["scans"] for row in rows] == ["wall", "threshold"] and rows[0]["returned %"] == pytest.approx(100)
+
+
+def test_requested_methods_without_a_row_are_named(rooms, toys, tmp_path):
+    lines = []
+    found = benchmark("odometry", rooms, tmp_path, Options([*toys, "cfar"]), log=lines.append)["odometry"]
+    assert lines == ["odometry: Requested methods that this benchmark does not compare: cfar."]
+    assert lines[0].removeprefix("odometry: ") in found.notes
+    assert lines[0].removeprefix("odometry: ") in (tmp_path / "odometry.html").read_text()
+    assert not Study.plan(BENCHMARKS["mapping"], DataSet.load(rooms), tmp_path, Options([*toys, "cfar"])).left_out
 
 
 @pytest.mark.parametrize(

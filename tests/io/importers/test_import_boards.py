@@ -50,6 +50,14 @@ def test_an_assumed_board_is_said(tmp_path):
         assert recording.config.board == "iwr6843aop" and warnings(recording) == ""
 
 
+def test_a_board_of_another_band_is_remarked(tmp_path):
+    source, _, _ = capture(tmp_path, SIXTY)
+    for given in ({"board": "iwr1843boost"}, {"config": parse_cfg("% Platform:xWR18xx\n" + SIXTY)}):
+        with load(source, **given) as recording:
+            assert "chirps start at 60 GHz, but the iwr1843boost has 76-78 GHz or 77-81 GHz" in warnings(recording)
+            assert "--board sets another one" in warnings(recording)
+
+
 def test_without_any_configuration(tmp_path):
     source, config, _ = capture(tmp_path, SIXTY)
     (tmp_path / "a.cfg").unlink()

@@ -86,7 +86,7 @@ def _array(axes: "Axes", array: xarray.DataArray, title: str, velocity: Any) -> 
             axes.plot(-left.values.ravel(), ahead.values.ravel(), ".", markersize=2)
             axes.set(xlabel="to the right, m", ylabel="forward, m", aspect="equal", title=title)
         case _:
-            one = "maps[0]" if "frame" in array.dims else "range_azimuth(rec[10]), which has no axis frame to select"
+            one = "maps[0]" if "frame" in array.dims else "range_azimuth(rec[10]) without [0]: it has no axis frame"
             raise InputError(
                 f"axes are {', '.join(map(str, array.dims)) or 'none'}, expected a map of one frame, such as {one}"
             )

@@ -17,7 +17,7 @@ class StraightOdometry:
         self.track: Track | None = None
 
     def update(self, batch: Batch) -> Track:
-        power = self.heatmaps.doppler_azimuth_of(batch.spectrum).numpy()  # (frame, doppler, azimuth)
+        power = self.heatmaps.doppler_azimuth_of(batch.spectrum, "capon").numpy()  # (frame, doppler, azimuth)
         closing = self.heatmaps.velocities[power.argmax(axis=1)]  # (frame, azimuth), m/s
         velocity = closing @ self.solve.T  # (frame, 2): forward, left, m/s
         rates = np.column_stack([velocity, np.zeros(len(batch))])  # and yaw rate, rad/s

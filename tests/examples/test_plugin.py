@@ -62,19 +62,19 @@ def test_its_format_is_read_and_its_method_runs(radarize, words, tmp_path):
 
 
 def test_its_odometry_runs(radarize, tmp_path):
-    """A radar that moves at 0.6 m/s forward and 0.3 m/s to the left, among 25 points 3 m around it."""
-    config = PRESETS["radarize"]
+    """A radar that moves at 0.6 m/s forward and 0.3 m/s to the left, among 25 points 2 to 4 m away."""
+    config, rng = PRESETS["radarize"], np.random.default_rng(0)
     stamps, angles = np.arange(8) * config.frame_period, np.radians(np.arange(-60, 61, 5))
     move = lambda t: (t[..., None] * [0.6, 0.3, 0.0], np.zeros(t.shape))  # noqa: E731
-    points = 3 * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(25)])
-    frames = record(config, move, points, np.full(25, 300.0), stamps, np.random.default_rng(0), noise=3.0)
+    points = rng.uniform(2, 4, (25, 1)) * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(25)])
+    frames = record(config, move, points, np.full(25, 300.0), stamps, rng, noise=3.0)
     with RecordingWriter(tmp_path / "moving.h5", config) as writer:
         writer.append(frames, stamps)
     arguments = "run", tmp_path / "moving.h5", "-o", tmp_path / "run", "--odometry", "straight", "--scans", "nearby"
     done = radarize(*arguments)
     assert done.returncode == 0, done.stderr
     velocity = RunFolder(tmp_path / "run").scans["velocity"]
-    assert velocity.mean(axis=0) == pytest.approx([0.6, 0.3], abs=0.06)
+    assert velocity.mean(axis=0) == pytest.approx([0.6, 0.3], abs=0.03)
     time, pose = read_tum(tmp_path / "run" / "odometry.tum")
     assert pose[-1, :2] == pytest.approx(velocity.mean(axis=0) * (time[-1] - time[0]), abs=0.005)
 

@@ -33,8 +33,8 @@ class TurnConfig(Frozen):
     )
     fastest: float = setting(np.radians(60.0), "standard deviation of an unknown turn rate", "rad/s", gt=0)
     trained: float = setting(
-        np.radians(25.0), "standard deviation of the turn rate in training: the network's estimate is a posterior mean, "
-        "which this prior draws to zero", "rad/s", tuned="5 walks of 60 s (of FURNISHED), scale of turns", gt=0
+        np.radians(25.0), "standard deviation of the turn rate in training, a prior that draws the network's turns to "
+        "zero and is removed from them", "rad/s", tuned="5 walks of 60 s (of FURNISHED), scale of turns", gt=0
     )  # fmt: skip
     variance_factor: float = setting(
         4.0, "factor on the growth of the yaw variance, because errors of consecutive turns are correlated", "1",

@@ -21,8 +21,10 @@ from radarize.io.jobs import Job, perform
 from radarsim.motion.statistics import Statistics
 from radarsim.motion.trajectory import Motion
 
-#: Folder of the results of scripts and of `radarize benchmark`, a JSON file each.
+#: Folder of the results of scripts and of `radarize benchmark`, a JSON file each, from which pages are written.
 PARTS = Path(__file__).parent / "results" / "parts"
+#: Folder of the results of a script that is run by itself: only `benchmarks.make` replaces those of the pages.
+TRIAL = Path("build/parts")
 #: Public captures and logs, beside the checkout.
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
 #: Options of scripts that evaluate real walks.
@@ -83,7 +85,7 @@ def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], No
             print(results.markdown())
 
         main.parser = argparse.ArgumentParser(description=inspect.getmodule(work).__doc__)
-        for option, (default, words, *more) in (options | {"out": (PARTS, "folder to write")}).items():
+        for option, (default, words, *more) in (options | {"out": (TRIAL, "folder to write")}).items():
             kind, value = (default, None) if isinstance(default, type) else (type(default), default)
             how = {"action": "store_true"} if default is False else {"type": kind, "default": value}
             how |= more[0] if more else {}

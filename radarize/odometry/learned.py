@@ -18,6 +18,8 @@ from radarize.signal.batch import Batch
 
 #: Covariance of a velocity without network output, (m/s)^2.
 ANY_VELOCITY = 2.0**2 * np.eye(2)
+#: Minimum weight of the measurement in the network's estimate of a turn (`LearnedRotation`).
+_LEAST_WEIGHT = 0.25
 
 
 class LearnedVelocity:
@@ -80,7 +82,7 @@ class LearnedRotation:
         self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of the last `size` frames
         self._yaws = FixedLagSmoother(size, settings.wander, settings.fastest)
-        self._inflation = settings.variance_factor
+        self._inflation, self._trained = settings.variance_factor, settings.trained
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Return the yaw increments of the next frames; their variances add up to that of the yaw since the start."""
@@ -122,7 +124,15 @@ class LearnedRotation:
             shown = torch.cat([shown.maps[shown.whole] for shown in windows])
             mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
             turns[whole] = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy()
+            turns[whole] /= self._weight(turns[whole][:, 1], self._duration(back)[whole])[:, None]
         return turns, back
+
+    def _weight(
+        self, variance: Float[np.ndarray, "window"], duration: Float[np.ndarray, "window"]
+    ) -> Float[np.ndarray, "window"]:
+        """Weight of the measurement in the network's estimate, the mean of a posterior: the rest is the prior, zero.
+        Divided by it, mean and variance are those of the measurement alone (product of Gaussians)."""
+        return np.maximum(1 - variance / (self._trained * duration) ** 2, _LEAST_WEIGHT)
 
     def _travel(
         self, times: np.ndarray, velocities: np.ndarray, back: np.ndarray
@@ -131,7 +141,16 @@ class LearnedRotation:
         kept = 1 - len(self._yaws.values)
         self._times = np.concatenate([self._times[kept:], times])
         self._velocities = np.concatenate([self._velocities[kept:], velocities])
-        newest = np.arange(len(self._times) - len(times), len(self._times))
-        first = newest - back
-        duration = self._times[newest] - self._times[first]
-        return duration[..., None] * (self._velocities[newest] + self._velocities[first]) / 2
+        newest, first = self._ends(back)
+        mean = (self._velocities[newest] + self._velocities[first]) / 2
+        return self._duration(back)[..., None] * mean
+
+    def _duration(self, back: np.ndarray) -> Float[np.ndarray, "spacing frame"]:
+        """Duration of each window, s."""
+        newest, first = self._ends(back)
+        return self._times[newest] - self._times[first]
+
+    def _ends(self, back: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Indices of the last and first frame of each window, in the frames that are kept."""
+        newest = np.arange(len(self._times) - back.shape[1], len(self._times))
+        return newest, newest - back

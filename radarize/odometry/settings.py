@@ -32,6 +32,10 @@ class TurnConfig(Frozen):
         np.radians(66.0), "random-walk density of the turn rate of a handheld radar", "rad/s^1.5", gt=0
     )
     fastest: float = setting(np.radians(60.0), "standard deviation of an unknown turn rate", "rad/s", gt=0)
+    trained: float = setting(
+        np.radians(25.0), "standard deviation of the turn rate in training, a prior that draws the network's turns to "
+        "zero and is removed from them", "rad/s", tuned="5 walks of 60 s (of FURNISHED), scale of turns", gt=0
+    )  # fmt: skip
     variance_factor: float = setting(
         4.0, "factor on the growth of the yaw variance, because errors of consecutive turns are correlated", "1",
         tuned="7 walks of 20 to 60 s (TURNS), NEES over 10 s of 0.7 to 5", ge=1

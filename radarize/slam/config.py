@@ -59,7 +59,10 @@ class GridConfig(Frozen):
     free_range: float = setting(
         5.0, "range up to which rays without a return clear cells; 0: they clear none", "m", ge=0
     )
-    nodes: int = setting(10, "nodes of a submap; the next submap starts when it is half full", "nodes", ge=2)
+    nodes: int = setting(
+        10, "nodes of a submap; the next submap starts when it is half full", "nodes", tuned="FURNISHED, preset radar",
+        ge=2
+    )  # fmt: skip
 
 
 class MatcherConfig(Frozen):
@@ -200,7 +203,7 @@ PRESETS: dict[str, SlamConfig] = {
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
         # Ranges from 0.3 m as in Cartographer's settings published with Radarize; the fields have what the rest was
         # tuned on.
-        grid=GridConfig(hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=16),
+        grid=GridConfig(hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=10),
         matcher=MatcherConfig(
             presearch_distance=0.0, presearch_angle=0.0, sigma=4.0, translation_floor=0.02, rotation_floor=0.01,
             correlated=16,

@@ -102,18 +102,25 @@ def test_recordings_of_other_physics_are_named_and_made_anew(tmp_path, monkeypat
 
 
 def test_physics_are_the_sources_wherever_they_are(tmp_path):
-    """The digest is the same after installation, without compiled files; a changed line of propagation changes it, one
-    of a report does not."""
+    """The digest is the same after installation, without compiled files; a changed line of propagation changes it, a
+    comment, a docstring or a line of a report does not."""
     for package in ("radarsim", "radarize"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
     shutil.copytree(ROOT / "scenes", tmp_path / "radarsim" / "scenes")
     digest = physics.digest.__wrapped__
     same = digest(tmp_path)
     assert same == digest(ROOT) == physics.digest()
-    for file, changes in (("radarsim/twin/report.py", False), ("radarsim/propagation/fields.py", True)):
-        with (tmp_path / file).open("a") as source:
-            source.write("# changed\n")
-        assert (digest(tmp_path) != same) == changes
+    for file, old, new, changes in (
+        ("radarsim/twin/report.py", "import", "import json\nimport", False),
+        ("radarsim/propagation/fields.py", "import numpy as np", "import numpy as np  # changed", False),
+        ("radarsim/propagation/fields.py", "The three numbers of an array.", "Three numbers.\n\n    Changed.", False),
+        ("radarsim/propagation/fields.py", "return array[0]", "return array[1]", True),
+    ):
+        before = (tmp_path / file).read_text()
+        assert old in before
+        (tmp_path / file).write_text(before.replace(old, new, 1))
+        assert (digest(tmp_path) != same) == changes, new
+        (tmp_path / file).write_text(before)
 
 
 def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):

@@ -138,8 +138,9 @@ def numbered(numbers: np.ndarray, times: np.ndarray) -> Batch:
 
 
 class Oracle:
-    """Network that returns true velocities, or true yaw increments with noise and its variance; for windows with an
-    untrained spacing it returns wrong values with a small variance."""
+    """Network that returns true velocities, or the mean and variance of yaw increments given measurements with noise
+    and the distribution of turns in training; for windows with an untrained spacing wrong values with a small
+    variance."""
 
     def __init__(self, times: np.ndarray, truth: np.ndarray, noise: float, rng: np.random.Generator):
         self.times, self.truth, self.noise, self.rng = times, truth, noise, rng
@@ -152,8 +153,10 @@ class Oracle:
             mean = np.where(known[:, None], self.truth[last], -3.0)
             return torch.tensor(mean), torch.eye(2).double().repeat(len(mean), 1, 1) * self.noise**2
         turn = self.truth[last] - self.truth[first] + self.rng.normal(0, self.noise, len(first))
-        mean = torch.tensor(np.where(known, turn, -0.5))[:, None]
-        return mean, torch.full((len(first), 1, 1), self.noise**2).double()
+        prior = (TurnConfig().trained * apart * SLOW.frame_period) ** 2
+        weight = prior / (prior + self.noise**2)
+        mean, variance = np.where(known, weight * turn, -0.5), weight * self.noise**2
+        return torch.tensor(mean)[:, None], torch.tensor(variance)[:, None, None]
 
 
 def nowhere(count: int) -> Velocities:
@@ -180,6 +183,21 @@ def test_increments_of_several_spacings_are_fused(tmp_path):
         chained.append(np.sqrt(count / (stride * 4)) * noise * rng.normal())
     assert np.std(ends) < np.std(chained)
     assert 0.3 < np.mean(nees) < 1.2  # below 1, as the initial rate is unknown
+
+
+def test_the_prior_of_training_is_removed(tmp_path):
+    """A posterior mean is drawn to zero, a measurement is not: yaw increments have the scale and the noise of the
+    measurement."""
+    count, noise, rate = 400, np.radians(0.8), np.radians(50)
+    times = np.arange(count) * CONFIG.frame_period
+    rotation = LearnedRotation(CONFIG, weights(tmp_path, "rotation"))
+    rotation._net = Oracle(times, rate * times, noise, np.random.default_rng(0))
+    turns, back = rotation.turns(numbered(np.arange(count), times), nowhere(count))
+    whole = back > 0
+    error = turns[..., 0][whole] - rate * back[whole] * CONFIG.frame_period
+    assert abs(error.mean()) < 4 * noise / np.sqrt(whole.sum())
+    assert error.std() == pytest.approx(noise, rel=0.1)
+    assert np.allclose(turns[..., 1][whole], noise**2)
 
 
 def test_correlated_errors_add_up(tmp_path):

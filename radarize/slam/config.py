@@ -154,7 +154,8 @@ class WallsConfig(Frozen):
         0.01, "standard deviation of the wall direction of a submap", "rad", tuned="WALLS and REAL, preset radar", gt=0
     )
     contrast: float = setting(
-        1.6, "minimum ratio of the points' concentration along the wall direction to that along any other", "1", gt=1
+        1.6, "minimum ratio of the points' concentration along the wall direction to that along any other", "1",
+        tuned="FURNISHED, preset radar", gt=1
     )
 
 
@@ -212,7 +213,7 @@ PRESETS: dict[str, SlamConfig] = {
             radius=8.0, distance=3.0, angle=1.0, candidates=5, every=4, nodes=8, front=0.25, min_score=0.55,
             final_score=0.4, levels=4, sigma=1.5, translation_floor=0.015, rotation_floor=0.009,
         ),
-        walls=WallsConfig(enabled=True),
+        walls=WallsConfig(enabled=True, contrast=1.4),
     ),
     # As published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many),
     # ranges of 0.3-4.284 m, no online correlative matcher, 100 iterations, optimisation every 90 nodes, default loop

@@ -178,7 +178,7 @@ def test_size_and_training_of_networks():
     network = UsedNetwork.of(Weights(None).of("rotation"))
     assert (
         network.sentence.startswith("rotation, width 16, 70")
-        and "trained on 3.4 h of training, then any-radar, then training (random-0), 14 epochs" in network.sentence
+        and "4.6 h of training, then any-radar, then training, then training (random-0), 18 epochs" in network.sentence
     )
 
 

@@ -154,8 +154,11 @@ class WallsConfig(Frozen):
         0.01, "standard deviation of the wall direction of a submap", "rad", tuned="WALLS and REAL, preset radar", gt=0
     )
     contrast: float = setting(
-        1.6, "minimum ratio of the points' concentration along the wall direction to that along any other", "1",
-        tuned="FURNISHED, preset radar", gt=1
+        1.6,
+        "minimum ratio of the points' concentration along the wall direction to that along any other",
+        "1",
+        tuned="FURNISHED, preset radar",
+        gt=1,
     )
 
 

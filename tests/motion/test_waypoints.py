@@ -55,6 +55,14 @@ def test_goes_through_each_of_them_in_order(office, platform):
     assert passed[-1] > motion.duration - 3
 
 
+@pytest.mark.parametrize("apart", [0.5, 1.0, 2.0])
+def test_goes_from_one_to_the_next_however_near(office, apart):
+    places = np.array([[3.0, 6.0], [3.0 + apart, 6.0]])
+    motion = plan_motion(office, "cart", None, np.random.default_rng(0), places)
+    ends = motion.path(np.array([0.0, motion.duration]))[:, :2]
+    assert ends == pytest.approx(places, abs=0.06)
+
+
 def test_goes_through_doors(office, rooms):
     assert len(rooms) >= 3
     motion = plan_motion(office, "handheld", None, np.random.default_rng(1), rooms)

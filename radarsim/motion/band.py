@@ -62,8 +62,8 @@ def _rounded(path: Float[np.ndarray, "n 2"], clearance: Clearance, radius: float
 
 
 def _smooth(line: Float[np.ndarray, "n 2"], sigma: float) -> Float[np.ndarray, "n 2"]:
-    """Smooth a line by a Gaussian of `sigma` m along it, or of a quarter of its length. Odd reflection at the ends keeps
-    them fixed, as far as the Gaussian reaches."""
+    """Smooth a line by a Gaussian of `sigma` m along it, at most a quarter of its length. Odd reflection at the ends
+    keeps them fixed."""
     sigma = min(sigma, STEP * (len(line) - 1) / 4)
     pad = int(4 * sigma / STEP)
     padded = np.pad(line, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")

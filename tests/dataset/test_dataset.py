@@ -59,7 +59,7 @@ def test_variants_of_a_recording_share_its_walk(tmp_path):
 
 
 def test_too_short_a_walk_is_refused(tmp_path):
-    (task,) = hall.specification(tmp_path, recordings=hall.recordings(duration=4, way=[[1, 2], [2, 2]])).tasks
+    (task,) = hall.specification(tmp_path, recordings=hall.recordings(duration=4, way=[[1, 2], [1.2, 2]])).tasks
     with pytest.raises(InputError, match="hall_cart_00: the way-points are reached after .* of 8 frames"):
         task.make(tmp_path)
     assert not list(tmp_path.glob("*.h5*"))

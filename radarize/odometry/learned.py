@@ -119,12 +119,12 @@ class LearnedRotation:
         whole = np.stack([shown.whole for shown in windows])
         back = np.where(whole, np.stack([shown.back for shown in windows]), 0)
         turns = np.full((*back.shape, 2), np.nan)
-        travel = self._travel(batch.centers, velocities.velocity, back)[whole]
+        duration, travel = (each[whole] for each in self._travel(batch.centers, velocities.velocity, back))
         if whole.any():
             shown = torch.cat([shown.maps[shown.whole] for shown in windows])
             mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
             turns[whole] = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy()
-            turns[whole] /= self._weight(turns[whole][:, 1], self._duration(back)[whole])[:, None]
+            turns[whole] /= self._weight(turns[whole][:, 1], duration)[:, None]
         return turns, back
 
     def _weight(
@@ -136,21 +136,12 @@ class LearnedRotation:
 
     def _travel(
         self, times: np.ndarray, velocities: np.ndarray, back: np.ndarray
-    ) -> Float[np.ndarray, "spacing frame 2"]:
-        """Displacement over each window from the velocities, an input of `RotationNet`."""
+    ) -> tuple[Float[np.ndarray, "spacing frame"], Float[np.ndarray, "spacing frame 2"]]:
+        """Duration of each window, and displacement over it from the velocities, an input of `RotationNet`."""
         kept = 1 - len(self._yaws.values)
         self._times = np.concatenate([self._times[kept:], times])
         self._velocities = np.concatenate([self._velocities[kept:], velocities])
-        newest, first = self._ends(back)
-        mean = (self._velocities[newest] + self._velocities[first]) / 2
-        return self._duration(back)[..., None] * mean
-
-    def _duration(self, back: np.ndarray) -> Float[np.ndarray, "spacing frame"]:
-        """Duration of each window, s."""
-        newest, first = self._ends(back)
-        return self._times[newest] - self._times[first]
-
-    def _ends(self, back: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the last and first frame of each window, in the frames that are kept."""
-        newest = np.arange(len(self._times) - back.shape[1], len(self._times))
-        return newest, newest - back
+        newest = np.arange(len(self._times) - len(times), len(self._times))
+        first = newest - back
+        duration = self._times[newest] - self._times[first]
+        return duration, duration[..., None] * (self._velocities[newest] + self._velocities[first]) / 2

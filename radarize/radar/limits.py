@@ -36,8 +36,7 @@ def check_limits(config: RadarConfig, demo: bool = False) -> None:
 
 def covers(board: Board, start_frequency: float) -> bool:
     """Whether a band of the board's chip contains the start frequency, Hz."""
-    slack = _SWEEP_TOLERANCE
-    return any(low - slack <= start_frequency <= high + slack for low, high in CHIPS[board.chip].bands)
+    return _sweeps(CHIPS[board.chip], start_frequency, start_frequency)
 
 
 def outside_band(config: RadarConfig) -> str:
@@ -51,6 +50,12 @@ def outside_band(config: RadarConfig) -> str:
     )
 
 
+def _sweeps(chip: Chip, start: float, end: float) -> bool:
+    """Whether a band of a chip contains the frequencies from start to end, Hz."""
+    slack = _SWEEP_TOLERANCE
+    return any(low - slack <= start and end <= high + slack for low, high in chip.bands)
+
+
 def _bands(chip: Chip) -> str:
     return " or ".join(f"{low / 1e9:g}-{high / 1e9:g} GHz" for low, high in chip.bands)
 
@@ -60,7 +65,7 @@ def _violations(config: RadarConfig, demo: bool) -> Iterator[str]:
     chip = CHIPS[name]
     start, sweep = config.start_frequency, config.slope * config.ramp_end_time
     slack = _SWEEP_TOLERANCE
-    if not any(low - slack <= start and start + sweep <= high + slack for low, high in chip.bands):
+    if not _sweeps(chip, start, start + sweep):
         yield (
             f"start_frequency, slope and ramp_end_time sweep {start / 1e9:.3f}-{(start + sweep) / 1e9:.3f} GHz, "
             f"expected wholly within {_bands(chip)} on the {name}"

@@ -150,9 +150,9 @@ class Task:
         final, late = self.path(folder), None
         with suppress(Stale):
             late = self._lacking(folder)
-        about = {"platform": self.platform, **self.attributes, ATTRIBUTE: self.identity}
         try:
-            scenario, cfg_text = self._scenario()
+            scenario, cfg_text, about = self._scenario()
+            about |= self.attributes | {ATTRIBUTE: self.identity}
             if late:
                 add_sensors(final, scenario, late, about, progress)
             else:
@@ -173,7 +173,7 @@ class Task:
         return str(moved)
 
     def _scenario(self):
-        """The `Scenario` to record, and the original configuration text of the radar."""
+        """See `radarsim.recording.simulate.planned`."""
         from radarsim.recording.simulate import planned
         from radarsim.world.scene import Scene
 
@@ -184,14 +184,13 @@ class Task:
         else:
             scene = mild = Scene.of(self.scene | drawn, self._place)
         radar = self.variant.radar_of(self.radar)
-        scenario, cfg_text, _ = planned(
+        return planned(
             scene, walk_in=mild, seed=self.seed, radar=radar, sensors=self.sensors, people=self.people,
             frontend=self.variant.frontend_of(self.frontend, load_config(radar)[0].board),
             platform=self.platform, duration=self.duration,
             mounting=self.variant.mounted or mounting(self.randomised, self.platform),
             waypoints=None if self.waypoints is None else np.array(self.waypoints),
         )  # fmt: skip
-        return scenario, cfg_text
 
     def clear(self, folder: Path) -> None:
         """Remove temporary files of this recording, left by this run or an interrupted one."""

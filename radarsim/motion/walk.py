@@ -1,6 +1,7 @@
 """Path of the radar through a scene: a platform's tour, through way-points, or along given poses."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +82,7 @@ class Walk:
                 )
         return ""
 
-    @property
+    @cached_property
     def _places(self) -> Float[np.ndarray, "n 2"] | None:
         places = self.waypoints
         return read_waypoints(places) if isinstance(places, (str, Path)) else places

@@ -161,9 +161,9 @@ class Scene:
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
         if not len(origins):
             return np.zeros(0, bool)
-        rays = _lent_rays(origins, targets - origins, margin)
-        ray = mi.Ray3f(mi.Point3f(rays[:3]), mi.Vector3f(rays[3:6]))
-        ray.maxt = mi.Float(rays[6])
+        *rows, length = map(mi.Float, _lent_rays(origins, targets - origins, margin))
+        ray = mi.Ray3f(mi.Point3f(*rows[:3]), mi.Vector3f(*rows[3:]))
+        ray.maxt = length
         return geometry.ray_test(ray).numpy().astype(bool)
 
     def hit(
@@ -180,8 +180,8 @@ class Scene:
         origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
         if not len(origins):
             return np.zeros(0), np.zeros(0, int)
-        rays = _lent_rays(origins, directions, 0.0)
-        ray = mi.Ray3f(mi.Point3f(rays[:3]), mi.Vector3f(rays[3:6]))
+        *rows, _ = map(mi.Float, _lent_rays(origins, directions, 0.0))
+        ray = mi.Ray3f(mi.Point3f(*rows[:3]), mi.Vector3f(*rows[3:]))
         found = scene.mi_scene.ray_intersect_preliminary(ray, coherent)
         shape = dr.reinterpret_array(mi.UInt32, found.shape)
         dr.eval(found.t, shape, found.prim_index)
@@ -224,8 +224,12 @@ class Scene:
 def _lent_rays(
     origins: Float[np.ndarray, "n 3"], ways: Float[np.ndarray, "n 3"], margin: float
 ) -> Float32[np.ndarray, "7 n"]:
-    """Origins, unit directions and lengths of rays along vectors, both ends shortened by `margin`, m; see `_room`."""
-    rays = _room((7, len(ways)), np.float32)
+    """Origins, unit directions and lengths of rays along vectors, both ends shortened by `margin`, m; see `_room`.
+
+    Dr.Jit is to be given each row by itself: a kernel that takes a vector from an array of two dimensions contains the
+    number of rays, so that every new number costs a compilation of 30 ms.
+    """
+    rays = _room((7, -(-len(ways) // _PACKET) * _PACKET), np.float32)[:, : len(ways)]
     _aim(np.ascontiguousarray(origins), np.ascontiguousarray(ways), margin, rays)
     return rays
 
@@ -250,12 +254,17 @@ def _lent(values: np.ndarray, dtype: type) -> np.ndarray:
 
 
 def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
-    """Array with padding at its end: Dr.Jit reads NumPy's memory in place in whole packets, which could otherwise
-    extend beyond the memory that the process may read."""
+    """Array of four-byte entries that Dr.Jit can read in place, which it does in whole packets.
+
+    Padding at the end keeps it from reading beyond the memory that the process may read. The start is aligned to a
+    packet, as rows are whose length is whole packets: Dr.Jit compiles each kernel anew for every combination of aligned
+    and unaligned inputs.
+    """
     size = int(np.prod(shape))
-    room: np.ndarray = np.empty(size + _PACKET, dtype)
-    room[size:] = 0
-    return room[:size].reshape(shape)
+    room: np.ndarray = np.empty(size + 2 * _PACKET, dtype)
+    first = -room.ctypes.data // room.itemsize % _PACKET
+    room[first + size :] = 0
+    return room[first : first + size].reshape(shape)
 
 
 def _radio_material(material: Material) -> object:

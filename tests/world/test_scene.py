@@ -72,6 +72,20 @@ def test_margin_ignores_the_surfaces_at_both_ends(clutter):
     assert not sheet.occluded(np.zeros((0, 3)), np.zeros((0, 3))).size
 
 
+def test_any_number_of_rays_takes_the_same_compiled_kernel(clutter):
+    rng = np.random.default_rng(2)
+    clutter.occluded(np.zeros(3), np.ones((1, 3)))  # Dr.Jit is there
+    import drjit as dr
+
+    for test in (clutter.occluded, clutter.hit):
+        kernels = set()
+        for number in (2, 3, 16, 17, 100, 4001):
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+                test(*rng.uniform(-1, 6, (2, number, 3)))
+            kernels.add(tuple(kernel["hash"] for kernel in dr.kernel_history()))
+        assert len(kernels) == 1 and len(kernels.pop()) == 1
+
+
 def test_rays_match_open3d(office):
     o3d = pytest.importorskip("open3d")
     world = o3d.t.geometry.RaycastingScene()
@@ -183,8 +197,8 @@ def test_rays_are_read_in_packets_past_their_end(clutter):
     values = np.arange(10.0).reshape(2, 5)
     found = _lent(values.T, np.float32)
     assert np.array_equal(found, values.T) and found.flags.c_contiguous
-    behind = found.base.size - found.size
-    assert found.base.ctypes.data == found.ctypes.data and behind >= 64 // found.itemsize
+    ends = [array.ctypes.data + array.nbytes for array in (found.base, found)]
+    assert ends[0] - ends[1] >= 64 and found.ctypes.data % 64 == 0
     import mitsuba as mi
 
     number = mi.Float(flat := _lent(np.zeros(3), np.float32))

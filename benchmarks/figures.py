@@ -136,8 +136,8 @@ def sizes() -> str:
     frames, found = 1800, {str(row["what"]): row for row in rows("dataset_speed")}
     raw, maps = (next(row for what, row in found.items() if what.startswith("2 workers") and what.endswith(kind))
                  for kind in ("thread, raw", "heatmaps"))  # fmt: skip
-    speed = {row["way"]: row for row in rows("simulator_speed")}
-    one, two = (speed[f"office: {way}"]["ms per frame"] for way in ("radarsim", "a recording by 2 processes"))
+    speed = frame_times()
+    one, two = (speed[f"office: {way}"] for way in ("radarsim", "a recording by 2 processes"))
     lines = [
         ["recording with all sensors, samples", f"{raw['kB per frame'] * frames / 1e3:.0f} MB", "-"],
         ["the same as heat maps (`storage: heatmaps`)", f"{maps['kB per frame'] * frames / 1e3:.0f} MB", "-"],
@@ -159,9 +159,14 @@ def heatmap_share() -> str:
     return f"{100 * found['2 workers x 1 thread, heatmaps'] / found['2 workers x 1 thread, raw']:.0f} %"
 
 
+def frame_times() -> dict[str, float]:
+    """Times per frame of the simulator by scene and way, ms."""
+    return {row["way"]: row["ms per frame"] for row in rows("simulator_speed")}
+
+
 def simulator() -> str:
     """Time per frame of the simulator and of Sionna RT on one scene."""
-    speed = {row["way"]: row["ms per frame"] for row in rows("simulator_speed")}
+    speed = frame_times()
     ours, theirs = speed["office: radarsim"], speed["office: --engine sionna"] / 1e3
     return f"{ours:.0f} ms on one core; the paths of Sionna RT take {theirs:.1f} s"
 
@@ -232,12 +237,54 @@ def back_end() -> str:
     return f"{', '.join(found)} m on {', '.join(LOGS)}"
 
 
+#: Headline figures: what, the page's part, the value of release 1.0.0 in bare rooms, and the present value.
+HEADLINES: tuple[tuple[str, str, str, Callable[[], str]], ...] = (
+    ("odometry, mean ATE", "walks", "0.130 m, 0.023 rad", lambda: _walks("odometry")),
+    ("odometry, mean ATE, handheld", "walks", "0.223 m, 0.033 rad", lambda: _walks("odometry", "handheld")),
+    ("SLAM, mean ATE", "walks", "0.034 m, 0.011 rad", lambda: _walks("SLAM")),
+    ("SLAM, worst walk", "walks", "0.230 m", lambda: f"{_on('walks')['worst SLAM m']:.3f} m"),
+    ("F1 of the map", "walks", "87.5 %", lambda: f"{_on('walks')['map F1 %']:.1f} %"),
+    ("SLAM, walks of five minutes", "long_walks", "0.027 m", lambda: mean_errors("long_walks")[1]),
+    ("ranges within 10 cm", "mapping", "89.9 %", lambda: f"{_default_scans('mapping')['within 10 cm %']:.1f} %"),
+    ("ghosts at the worst level of the multipath test", "multipath", "4.6 % of returns",
+     lambda: f"{_default_scans('multipath', 'most severe')['ghosts, % of returns']:.1f} % of returns"),
+    ("SLAM with the IWR6843AOP", "radars", "0.065 m", lambda: f"{_chosen('60 GHz, antennas')['SLAM m'].split()[0]} m"),
+    ("simulating a frame of the office, one core", "simulator_speed", "25.9 ms",
+     lambda: f"{frame_times()['office: radarsim']:.1f} ms"),
+)  # fmt: skip
+
+
+def _on(part: str, group: str = "all") -> Row:
+    return next(row for row in rows(part, "by platform and building") if row["on"] == group)
+
+
+def _walks(kind: str, group: str = "all") -> str:
+    row = _on("walks", group)
+    return f"{row[f'{kind} m'].split()[0]} m, {row[f'{kind} rad']:.3f} rad"
+
+
+def _default_scans(part: str, group: str = "all") -> Row:
+    column = "on" if part == "mapping" else "levels"
+    return next(row for row in rows(part) if row["scans"] == "segmentation" and row[column] == group)
+
+
+def _chosen(radar: str) -> Row:
+    return next(row for row in rows("radars") if row["chosen"] and row["radar"].startswith(radar))
+
+
+def headlines() -> str:
+    """Headline figures of release 1.0.0 and now; a dash where the page is still that release's."""
+    lines = [[what, old, "-" if release(part) == "1.0.0" else now()] for what, part, old, now in HEADLINES]
+    return table(["", "1.0.0, bare rooms", "now, furnished rooms"], lines)
+
+
 #: Figures by name.
 FIGURES: dict[str, Callable[[], str]] = {
     "readme": readme, "walks": walks, "walks-mean": walks_mean, "long-walks-mean": long_walks_mean,
     "scans": scans, "conditions": conditions, "radars": radars, "real": real,
     "realism": realism, "back-end": back_end, "clock-gap": clock_gap, "live-time": live_time,
-    "live-dropped": live_dropped, "sizes": sizes, "heatmap-share": heatmap_share, "simulator": simulator,
+    "live-dropped": live_dropped, "headlines": headlines, "sizes": sizes, "heatmap-share": heatmap_share,
+    "simulator": simulator,
 }  # fmt: skip
 
 
@@ -258,8 +305,8 @@ def written(text: str) -> str:
 
 def pages() -> list[Path]:
     """That have figures."""
-    return [page for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))) if "<!-- figures: " in
-            page.read_text()]  # fmt: skip
+    texts = (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md")))
+    return [page for page in texts if "<!-- figures: " in page.read_text()]
 
 
 def main() -> None:

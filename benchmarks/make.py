@@ -84,7 +84,8 @@ class Part:
             command = [sys.executable, "-m", f"benchmarks.{self.name}", *words, "--out", str(place.parts)]
         else:
             folder = place.radarhd if benchmark == "real" else common(data)
-            out = place.work / "tables" / self.name
+            # Benchmarks of the same data share their runs.
+            out = place.work / "tables" / self.about.get("data", self.name).rstrip("/")
             command = [sys.executable, "-m", "radarize.cli", "benchmark", benchmark, "--data", str(folder)]
             command += ["--out", str(out), *words, *place.spread]
         if self._made(command, place):

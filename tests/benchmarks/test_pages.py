@@ -17,7 +17,7 @@ from radarsim import cli as radarsim
 PLACE = make.Place(PARTS, Path(), Path(), False, None, None)
 LISTED = {name: about for page in make.PAGES.values() for name, about in page["parts"].items()}
 #: Parts that were made by scripts of release 1.0, with commands of that release.
-FORMER = {"walks", "long_walks"}
+FORMER = {"long_walks"}
 
 
 def understood(command: str) -> None:

@@ -315,7 +315,8 @@ def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
 
 def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
     """A training continues from the weights of another: without further steps it is equally good."""
-    first = train("translation", small, tmp_path / "first.safetensors", QUICK["translation"])
+    settings = replace(QUICK["translation"], epochs=20)  # after 10 some processors have an error near that of guessing
+    first = train("translation", small, tmp_path / "first.safetensors", settings)
     mixed = tmp_path / "mixed"
     mixed.mkdir()
     for k, config in enumerate((CONFIG, OTHER, OTHER)):

@@ -53,9 +53,22 @@ def walks() -> str:
     return table(["mean error, m", "handheld", "cart", "robot", "all", "worst walk"], lines)
 
 
+def _on(part: str, group: str = "all") -> Row:
+    return next(row for row in rows(part, "by platform and building") if row["on"] == group)
+
+
+def _default_scans(part: str, group: str = "all") -> Row:
+    column = "on" if part == "mapping" else "levels"
+    return next(row for row in rows(part) if row["scans"] == "segmentation" and row[column] == group)
+
+
+def _chosen(radar: str) -> Row:
+    return next(row for row in rows("radars") if row["chosen"] and row["radar"].startswith(radar))
+
+
 def mean_errors(part: str) -> tuple[str, str]:
     """Mean ATE of odometry and of SLAM over all walks of a part, m."""
-    mean = next(row for row in rows(part, "by platform and building") if row["on"] == "all")
+    mean = _on(part)
     odometry, slam = (float(mean[f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
     return f"{odometry:.2f} m", f"{slam:.3f} m"
 
@@ -77,11 +90,11 @@ def readme() -> str:
     def page(name: str, part: str, *cells: str) -> list[str]:
         return [*cells, release(part), f"[{name}](benchmarks/results/{name}.md)"]
 
-    radar = [row for row in rows("radars") if str(row["radar"]).startswith("radarize")]
-    without = next(row for row in radar if (row["odometry by"], row["scans"]) == ("doppler", "first-echo"))
-    chosen = next(row for row in radar if row["chosen"])
+    chosen, pair = _chosen("radarize"), ("doppler", "first-echo")
+    same_radar = [row for row in rows("radars") if row["radar"] == chosen["radar"]]
+    without = next(row for row in same_radar if (row["odometry by"], row["scans"]) == pair)
     plain, networks = ([str(row[f"{kind} m"]).split()[0] for kind in ("odometry", "SLAM")] for row in (without, chosen))
-    scan = next(row for row in rows("mapping") if row["scans"] == "segmentation" and row["on"] == "all")
+    scan = _default_scans("mapping")
     live = next(row for row in rows("live_speed") if row["odometry, scans"] == "fused, segmentation")
     (minute, minute_slam), number = mean_errors("walks"), sum(1 for _ in rows("walks", "walk by walk"))
     lines = [
@@ -263,22 +276,9 @@ HEADLINES: tuple[tuple[str, str, str, Callable[[], str]], ...] = (
 )  # fmt: skip
 
 
-def _on(part: str, group: str = "all") -> Row:
-    return next(row for row in rows(part, "by platform and building") if row["on"] == group)
-
-
 def _walks(kind: str, group: str = "all") -> str:
     row = _on("walks", group)
     return f"{row[f'{kind} m'].split()[0]} m, {row[f'{kind} rad']:.3f} rad"
-
-
-def _default_scans(part: str, group: str = "all") -> Row:
-    column = "on" if part == "mapping" else "levels"
-    return next(row for row in rows(part) if row["scans"] == "segmentation" and row[column] == group)
-
-
-def _chosen(radar: str) -> Row:
-    return next(row for row in rows("radars") if row["chosen"] and row["radar"].startswith(radar))
 
 
 def headlines() -> str:

@@ -156,13 +156,10 @@ class Scene:
     ) -> Bool[np.ndarray, "*#n"]:
         """Whether anything lies on the segment from origin to target, both ends shortened by `margin` (m)."""
         geometry = self.sionna.mi_scene  # before Dr.Jit is loaded: this selects the LLVM
-        import mitsuba as mi
-
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
         if not len(origins):
             return np.zeros(0, bool)
-        *rows, length = map(mi.Float, _lent_rays(origins, targets - origins, margin))
-        ray = mi.Ray3f(mi.Point3f(*rows[:3]), mi.Vector3f(*rows[3:]))
+        ray, length = _rays(origins, targets - origins, margin)
         ray.maxt = length
         return geometry.ray_test(ray).numpy().astype(bool)
 
@@ -180,8 +177,7 @@ class Scene:
         origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
         if not len(origins):
             return np.zeros(0), np.zeros(0, int)
-        *rows, _ = map(mi.Float, _lent_rays(origins, directions, 0.0))
-        ray = mi.Ray3f(mi.Point3f(*rows[:3]), mi.Vector3f(*rows[3:]))
+        ray, _ = _rays(origins, directions, 0.0)
         found = scene.mi_scene.ray_intersect_preliminary(ray, coherent)
         shape = dr.reinterpret_array(mi.UInt32, found.shape)
         dr.eval(found.t, shape, found.prim_index)
@@ -221,14 +217,22 @@ class Scene:
         return np.concatenate(pieces)
 
 
+def _rays(origins: Float[np.ndarray, "n 3"], ways: Float[np.ndarray, "n 3"], margin: float) -> tuple:
+    """Mitsuba's rays along vectors, and their lengths, both ends shortened by `margin`, m.
+
+    Dr.Jit is given each row by itself: a kernel that takes a vector from an array of two dimensions contains the number
+    of rays, so that every new number costs a compilation of 30 ms.
+    """
+    import mitsuba as mi
+
+    *rows, length = map(mi.Float, _lent_rays(origins, ways, margin))
+    return mi.Ray3f(mi.Point3f(*rows[:3]), mi.Vector3f(*rows[3:])), length
+
+
 def _lent_rays(
     origins: Float[np.ndarray, "n 3"], ways: Float[np.ndarray, "n 3"], margin: float
 ) -> Float32[np.ndarray, "7 n"]:
-    """Origins, unit directions and lengths of rays along vectors, both ends shortened by `margin`, m; see `_room`.
-
-    Dr.Jit is to be given each row by itself: a kernel that takes a vector from an array of two dimensions contains the
-    number of rays, so that every new number costs a compilation of 30 ms.
-    """
+    """Origins, unit directions and lengths of the same, in memory that Dr.Jit can read, see `_room`."""
     rays = _room((7, -(-len(ways) // _PACKET) * _PACKET), np.float32)[:, : len(ways)]
     _aim(np.ascontiguousarray(origins), np.ascontiguousarray(ways), margin, rays)
     return rays

@@ -1,7 +1,7 @@
 """Trajectory errors: absolute after alignment (ATE), and relative over a frame, a second and a metre (RE).
 
 As in the paper (section 6): association within 10 ms, alignment without scale, means per trajectory. Relative rotation
-is a relative error, in contrast to the paper's tables. Transformations and error matrices are computed by evo.
+is a relative error, in contrast to the paper's tables. Definitions are those of evo's `evo_ape` and `evo_rpe`.
 """
 
 from collections.abc import Callable
@@ -9,10 +9,9 @@ from dataclasses import asdict, dataclass, field
 from typing import overload
 
 import numpy as np
-from evo.core.metrics import APE, RPE, PoseRelation
 from evo.core.trajectory import PoseTrajectory3D
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from radarize.io.alignment import Association, alignment, matched, moved, planar
 
@@ -109,13 +108,15 @@ def evaluate_trajectory(
     estimate, reference = matched(estimate, reference, association, names)
     if in_plane:
         estimate, reference = planar(estimate), planar(reference)
-    relative = {span: _relative_errors(estimate, reference, pairs) for span, pairs in _pairs(reference).items()}
     # Relative errors do not depend on the alignment, absolute ones do.
-    last = RPE.rpe_base(reference.poses_se3[0], reference.poses_se3[-1], estimate.poses_se3[0], estimate.poses_se3[-1])
+    ways = _transforms(reference), _transforms(estimate)
+    relative = {span: _statistics(_relative_errors(*ways, pairs)) for span, pairs in _pairs(reference).items()}
+    last = _relative_errors(*ways, np.array([[0, len(reference.timestamps) - 1]]))
     turn, shift = alignment(estimate, reference, in_plane)
     aligned = moved(estimate, turn, shift)
-    position_errors = _absolute_errors(aligned, reference, PoseRelation.translation_part)
-    rotation_errors = _absolute_errors(aligned, reference, PoseRelation.rotation_angle_rad)
+    errors = ways[0].inv() * _transforms(aligned)
+    position_errors = np.linalg.norm(errors.translation, axis=1)
+    rotation_errors = errors.rotation.magnitude()
     distance = float(reference.path_length)
     return TrajectoryErrors(
         position=Statistics.of(position_errors),
@@ -124,7 +125,7 @@ def evaluate_trajectory(
         distance=distance,
         duration=float(reference.timestamps[-1] - reference.timestamps[0]),
         share=float(position_errors.mean() / distance) if distance else np.nan,
-        drift=float(np.linalg.norm(last[:3, 3]) / distance) if distance else np.nan,
+        drift=float(np.linalg.norm(last.translation) / distance) if distance else np.nan,
         time=reference.timestamps,
         position_errors=position_errors,
         rotation_errors=rotation_errors,
@@ -135,10 +136,9 @@ def evaluate_trajectory(
     )
 
 
-def _absolute_errors(estimate: PoseTrajectory3D, reference: PoseTrajectory3D, relation: PoseRelation) -> np.ndarray:
-    metric = APE(relation)
-    metric.process_data((reference, estimate))
-    return np.asarray(metric.error, float)
+def _transforms(path: PoseTrajectory3D) -> RigidTransform:
+    attitudes = Rotation.from_quat(path.orientations_quat_wxyz, scalar_first=True)
+    return RigidTransform.from_components(path.positions_xyz, attitudes)
 
 
 def _pairs(reference: PoseTrajectory3D) -> dict[str, np.ndarray]:
@@ -160,13 +160,16 @@ def _apart(values: np.ndarray, delta: float) -> np.ndarray:
     return np.column_stack([np.flatnonzero(good), nearest[good]])
 
 
-def _relative_errors(
-    estimate: PoseTrajectory3D, reference: PoseTrajectory3D, pairs: np.ndarray
-) -> dict[str, Statistics]:
-    q, p = reference.poses_se3, estimate.poses_se3
-    errors = np.array([RPE.rpe_base(q[i], q[j], p[i], p[j]) for i, j in pairs]).reshape(-1, 4, 4)
-    angles = Rotation.from_matrix(errors[:, :3, :3]).magnitude() if len(errors) else np.empty(0)
-    return {"position": Statistics.of(np.linalg.norm(errors[:, :3, 3], axis=1)), "rotation": Statistics.of(angles)}
+def _relative_errors(reference: RigidTransform, estimate: RigidTransform, pairs: np.ndarray) -> RigidTransform:
+    """Return the estimated motion between the poses of each pair, relative to the true one."""
+    first, second = pairs.T
+    true, estimated = (path[first].inv() * path[second] for path in (reference, estimate))
+    return true.inv() * estimated
+
+
+def _statistics(errors: RigidTransform) -> dict[str, Statistics]:
+    shifts = np.linalg.norm(errors.translation, axis=1)
+    return {"position": Statistics.of(shifts), "rotation": Statistics.of(errors.rotation.magnitude())}
 
 
 @overload

@@ -89,29 +89,27 @@ class MovingTargets:
         """Whether a part, of some or of all, obstructs a segment at its time t, s; ends are shortened by `margin`,
         m."""
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
-        hidden, some = np.zeros(len(origins), bool), np.arange(len(self.parts)) if parts is None else parts
+        some = np.arange(len(self.parts)) if parts is None else parts
         if not len(some):
-            return hidden
+            return np.zeros(len(origins), bool)
         times, which = np.unique(np.broadcast_to(t, len(origins)), return_inverse=True)
-        for k in range(len(times)):
-            (turn, center), now = self.poses(times[k : k + 1]), which == k
-            bodies = turn[0, some], center[0, some], self._half[some], self._capsule[some]
-            hidden[now] = _hidden(origins[now], targets[now], *bodies, margin)
-        return hidden
+        turn, center = self.poses(times)
+        bodies = turn[:, some], center[:, some], self._half[some], self._capsule[some]
+        return _hidden(origins, targets, which, *bodies, margin)
 
 
 @njit(parallel=True, cache=True)
-def _hidden(origins, targets, turn, center, half, capsule, margin):
-    """Whether segments, shortened at both ends, intersect a part."""
+def _hidden(origins, targets, which, turn, center, half, capsule, margin):
+    """Whether segments, shortened at both ends, intersect a part in its pose at their time, of index `which`."""
     hidden = np.zeros(len(origins), np.bool_)
     for i in prange(len(origins)):
         way = targets[i] - origins[i]
         length = np.sqrt(np.dot(way, way))
         if length <= 2 * margin:
             continue
-        way = way / length
-        for p in range(len(center)):
-            enters, leaves = crossing(origins[i], way, turn[p], center[p], half[p], capsule[p])
+        way, k = way / length, which[i]
+        for p in range(len(half)):
+            enters, leaves = crossing(origins[i], way, turn[k, p], center[k, p], half[p], capsule[p])
             if enters <= length - margin and leaves >= margin:
                 hidden[i] = True
                 break

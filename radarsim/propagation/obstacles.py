@@ -75,7 +75,8 @@ class Obstacles:
         if through is not None and self.transmission is not None and self.transmission.opaque is not None:
             rows = np.flatnonzero(blocked & through)
             blocked[rows] = self.transmission.opaque.occluded(begin[rows], end[rows], CLEARANCE)
-        blocked |= self.moving.occluded(begin, end, observation.time[frame], parts=self.moving.opaque)
+        rows = np.flatnonzero(~blocked)
+        blocked[rows] = self._by_movers(observation, frame[rows], begin[rows], end[rows])
         if len(self.plates):
             blocked |= self.plates.passage(observation, frame, begin, end, np.zeros(len(frame), bool))[0] == 0
         return ~blocked
@@ -101,12 +102,20 @@ class Obstacles:
             if len(through):
                 up = observation.rotation[frame[through], :, 2]
                 factor[through], delay[through] = self.transmission.passage(begin[through], end[through], up)
-        factor[self.moving.occluded(begin, end, observation.time[frame], parts=self.moving.opaque)] = 0
+        rows = np.flatnonzero(factor)
+        factor[rows[self._by_movers(observation, frame[rows], begin[rows], end[rows])]] = 0
         if len(self.plates):
             passed, late = self.plates.passage(observation, frame, begin, end, allowed & (factor != 0))
             factor, delay = factor * passed, delay + late
         opaque = factor == 0
         return Passage(factor, delay, ~opaque & (factor != 1), opaque.astype(float))
+
+    def _by_movers(
+        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"],
+    ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
+        """Whether an opaque part of a mover obstructs a ray."""
+        return self.moving.occluded(begin, end, observation.time[frame], parts=self.moving.opaque)
 
     def way(
         self, observation: Observation, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],

@@ -7,11 +7,13 @@ from numba import njit
 @njit
 def crossing(origin, way, turn, center, half, capsule):
     """Distances along a ray at which it enters and leaves a part, m; inf and -inf if it misses."""
-    towards = center - origin
-    along = np.dot(towards, way)
-    reach = half[2] + half[0] if capsule else np.sqrt(np.dot(half, half))
-    if np.dot(towards, towards) - along * along > reach * reach:  # misses the bounding sphere
+    # In scalars: most rays miss the bounding sphere, and arrays would take longer than the test.
+    x, y, z = center[0] - origin[0], center[1] - origin[1], center[2] - origin[2]
+    along = x * way[0] + y * way[1] + z * way[2]
+    square = (half[2] + half[0]) ** 2 if capsule else half[0] ** 2 + half[1] ** 2 + half[2] ** 2
+    if x * x + y * y + z * z - along * along > square:
         return np.inf, -np.inf
+    towards = (x, y, z)
     a, d = np.zeros(3), np.zeros(3)  # in the part's own frame
     for k in range(3):
         for j in range(3):

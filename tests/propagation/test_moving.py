@@ -37,17 +37,18 @@ def test_scatterers_are_carried_along():
 
 
 def test_occlusion_against_brute_force():
-    """Segments against capsules and boxes: the same as sampling a thousand points along each segment."""
+    """Segments at three times against capsules and boxes: the same as sampling a thousand points along each."""
     rng = np.random.default_rng(2)
     movers = [WALKER, Door(name="d", hinge=(2, 0.5, 1)), Fan(name="f", center=(1, -0.5, 1.5))]
     crowd = MovingTargets(movers, rng)
     origins, targets = rng.uniform([-1, -1.5, 0], [4, 1.5, 2], (2, 1500, 3))
-    hidden = crowd.occluded(origins, targets, t=0.9, margin=0.0)
-    turn, center = crowd.poses(np.array([0.9]))
+    times, which = np.array([0.2, 0.9, 1.6]), rng.integers(0, 3, 1500)
+    hidden = crowd.occluded(origins, targets, t=times[which], margin=0.0)
+    turn, center = crowd.poses(times)
     along = origins[:, None] + np.linspace(0, 1, 1001)[:, None] * (targets - origins)[:, None]
     truth, border = np.zeros(1500, bool), np.zeros(1500, bool)
     for k, part in enumerate(part for mover in movers for part in mover.parts()):
-        local = (along - center[0, k]) @ turn[0, k]
+        local = (along - center[which, k][:, None]) @ turn[which, k]
         if part.capsule:
             axis = local - np.clip(local[..., 2], -part.half[2], part.half[2])[..., None] * [0, 0, 1]
             depth = part.half[0] - np.linalg.norm(axis, axis=2)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import torch
 
 from radarize.io.errors import InputError
 from radarize.io.replacing import replacing
@@ -65,7 +66,7 @@ def train(
         settings: hyper-parameters; None: those of the task.
         options: options of the run.
         progress: called with (stage, done, in all).
-        log: called with a line for every epoch.
+        log: called with a line for every epoch, and if this processor is slow with the precision.
 
     Raises:
         InputError: unusable data or settings, an existing checkpoint without `resume` or of other settings, or a loss
@@ -89,6 +90,8 @@ def train(
     with team(options.device) as crew:
         lead = crew.rank == 0
         progress, log = (progress, log) if lead else (_nothing, _nothing)
+        if settings.precision == "bfloat16" and crew.device.type == "cpu" and not _has_bfloat16():
+            log("precision bfloat16: this processor emulates it, several times slower than float32")
         parts = _read(task, data, options, settings.seed, progress, before.grid if before else None)
         trainer = Trainer(task, settings, *parts, crew)
         if begun is not None:
@@ -119,6 +122,12 @@ def train(
             log("calibrated: " + _words(metrics))
         crew.wait()
     return output
+
+
+def _has_bfloat16() -> bool:
+    """Whether this processor has instructions for bfloat16, or PyTorch is too old to list them."""
+    found = getattr(torch.cpu, "get_capabilities", dict)()
+    return not found or any(there for name, there in found.items() if "bf16" in name)
 
 
 def _words(numbers: dict[str, float]) -> str:

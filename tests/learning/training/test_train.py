@@ -334,3 +334,13 @@ def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
     assert errors[0] < 0.3 and abs(errors[1] - errors[0]) < 0.05  # of 0.8 m/s RMS
     with pytest.raises(InputError, match="is a network for 'translation' .*expected one for 'rotation'"):
         train("rotation", mixed, tmp_path / "turns.safetensors", options=TrainOptions(start=first))
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_processor_without_bfloat16_is_reported(small, tmp_path, monkeypatch, there):
+    """Emulated, it takes several times as long as float32."""
+    monkeypatch.setattr("torch.cpu.get_capabilities", lambda: {"avx2": True, "avx512_bf16": there})
+    lines: list[str] = []
+    settings = replace(TINY, epochs=1, precision="bfloat16")
+    train("translation", small, tmp_path / "a.safetensors", settings, TrainOptions(device="cpu"), log=lines.append)
+    assert any("bfloat16" in line for line in lines) is not there

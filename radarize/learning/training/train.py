@@ -126,8 +126,8 @@ def train(
 
 def _has_bfloat16() -> bool:
     """Whether this processor has instructions for bfloat16, or PyTorch is too old to list them."""
-    found = getattr(torch.cpu, "get_capabilities", dict)()
-    return not found or any(there for name, there in found.items() if "bf16" in name)
+    capabilities = getattr(torch.cpu, "get_capabilities", None)
+    return capabilities is None or any(there for name, there in capabilities().items() if "bf16" in name)
 
 
 def _words(numbers: dict[str, float]) -> str:

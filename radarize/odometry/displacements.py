@@ -13,6 +13,9 @@ from radarize.odometry.integration import Track
 from radarize.odometry.smoother import FixedLagSmoother
 from radarize.odometry.uncertainty import ErrorModel
 
+#: Result of `DisplacementIntegrator.update`.
+Update = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]
+
 #: Random walk of the speed of a walker, m/s^1.5, and standard deviation of the speed before any measurement, m/s.
 _WANDER, _FASTEST = 0.37, 1.0
 
@@ -51,7 +54,7 @@ class DisplacementIntegrator:
 
     def update(
         self, dt: float, back: int, displacement: np.ndarray, covariance: np.ndarray, yaw: float, yaw_variance: float
-    ) -> tuple[np.ndarray, ...]:
+    ) -> Update:
         """Return pose, step, covariance of the step, velocity, its covariance, and whether a displacement observes the
         motion, of the frame just added.
 
@@ -80,9 +83,8 @@ class DisplacementIntegrator:
         return self._pose, between(previous, self._pose), spread, rate, velocity_covariance, back > 0
 
 
-def as_track(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bool = False) -> Track:
+def as_track(times: np.ndarray, track: list[Update], turn_seen: bool = False) -> Track:
     """Track of the results of `DisplacementIntegrator.update` of every frame. Its yaw increments are observed where
     displacements are, or always."""
-    *values, seen = (np.stack(each) for each in zip(*track, strict=True))
-    pose, step, spread, *velocity = values
-    return Track(times, pose, step, *velocity, seen, seen | turn_seen, ErrorModel.independent(spread))
+    pose, step, spread, velocity, covariance, seen = (np.stack(each) for each in zip(*track, strict=True))
+    return Track(times, pose, step, velocity, covariance, seen, seen | turn_seen, ErrorModel.independent(spread))

@@ -38,12 +38,13 @@ class LearnedVelocity:
     def __init__(self, radar: RadarConfig, weights: Path):
         self._net, header = compiled(weights, TranslationNet, radar)
         self._windows = header.windows(radar, TranslationNet.maker)
+        assert header.grid is not None  # it has maps
         self.limit = header.grid.reach / 2
 
     @torch.inference_mode()
     def estimate(self, batch: Batch, requested: Bool[np.ndarray, "frame"] | None = None) -> Velocities:
         """Return the velocities of the next frames, or of the requested ones only; inliers are zero."""
-        measured = ~batch.aliases.any(axis=1)  # the network is trained on speeds without aliasing
+        measured = np.asarray(~batch.aliases.any(axis=1))  # the network is trained on speeds without aliasing
         if requested is not None:
             measured &= requested
         velocity = np.zeros((len(batch), 2))
@@ -101,7 +102,7 @@ class LearnedRotation:
                 self._yaws.add_relative_motion(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last
             growth[i] = max(self._yaws.covariance[-2, -2] - variance, 1e-8)
-        measured = (back > 0).any(axis=0)
+        measured = np.asarray((back > 0).any(axis=0))
         growth[measured] *= self._inflation
         return Rotations.independent(yaw, growth, measured)
 

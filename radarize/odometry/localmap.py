@@ -32,7 +32,7 @@ class Grid(NamedTuple):
     """Cells of a map: running mean, number of frames in it, and side of a cell (m)."""
 
     mean: Float32[np.ndarray, "x y"]
-    count: Float32[np.ndarray, "x y"]
+    frames: Float32[np.ndarray, "x y"]
     cell: float
 
 
@@ -47,7 +47,8 @@ class LocalMap:
     def __init__(self, reach: float, cell: float):
         cell = max(cell, 2 * (reach + 2 * _MAX_OFFSET) / _MAX_CELLS)
         side = 2 * int((reach + 2 * _MAX_OFFSET) / cell)
-        self._grid = Grid(*np.zeros((2, side, side), np.float32), cell)
+        mean, frames = np.zeros((2, side, side), np.float32)
+        self._grid = Grid(mean, frames, cell)
 
     def correlate(
         self, view: View, positions: Float[np.ndarray, "yaw 2"], yaws: Float[np.ndarray, "yaw"]
@@ -67,12 +68,13 @@ class LocalMap:
         steps = np.rint(position / cell).astype(int)
         if np.abs(steps).max() * cell <= _MAX_OFFSET:
             return position
-        self._grid = Grid(*(shift(each, -steps, order=0) for each in self._grid[:2]), cell)
+        mean, frames = (shift(each, -steps, order=0) for each in (self._grid.mean, self._grid.frames))
+        self._grid = Grid(mean, frames, cell)
         return position - steps * cell
 
     def forget(self) -> None:
         """Discard the map."""
-        self._grid.mean[:] = self._grid.count[:] = 0.0
+        self._grid.mean[:] = self._grid.frames[:] = 0.0
 
 
 @njit(cache=True, fastmath=True)

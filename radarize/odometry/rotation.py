@@ -22,6 +22,7 @@ tracked echoes and walls.
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -38,6 +39,9 @@ from radarize.odometry.parabola import vertex
 from radarize.odometry.smoother import Gaussian, random_walk_covariance
 from radarize.signal.batch import Batch
 from radarize.signal.heatmaps import Heatmaps
+
+if TYPE_CHECKING:
+    from radarize.odometry.integration import RotationEstimator
 
 #: Maximum number of range and Doppler bins: it bounds the computing time of a frame for every chirp configuration.
 _MAX_RANGES, _MAX_DOPPLER_BINS = 256, 64

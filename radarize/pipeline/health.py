@@ -79,7 +79,7 @@ class Health:
             found["disturbed", _INTERFERENCE] = flaws.disturbed.any(axis=(1, 2))
             for state, broken in (("dead", flaws.dead), ("saturated", flaws.saturated)):
                 for place in np.flatnonzero(broken.any(axis=0)):
-                    found["disturbed", self._broken(place, state)] = broken[:, place]
+                    found["disturbed", self._broken(int(place), state)] = broken[:, place]
         return found
 
     @property

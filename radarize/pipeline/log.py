@@ -53,7 +53,7 @@ class Log:
         Raises:
             InputError: a file or field is missing or malformed.
         """
-        scans, moved, errors = Path(scans), odometry and read_tum(odometry), None
+        scans, moved, errors = Path(scans), read_tum(odometry) if odometry else None, None
         if scans.is_dir():
             run = RunFolder(scans)
             moved = moved or run.odometry

@@ -126,7 +126,7 @@ class Odometry:
         found = copy(motion_so_far) if motion_so_far is not None else MotionCovariance(start_errors, scale=0.0)
         for k, errors in enumerate(steps, low):
             begin, finish = max(start, times[max(k - 1, 0)]), min(end, times[k])
-            if finish > begin:
+            if errors is not None and finish > begin:
                 motion = between(self.pose(begin), self.pose(finish))
                 found.step(motion, errors.part((finish - begin) / (times[k] - times[k - 1])))
         return found
@@ -176,9 +176,8 @@ class Drift:
 
     def keep(self, numbers: Sequence[int]) -> None:
         """Remove all other nodes."""
-        self._inverse, self._sums, self._lengths = (
-            [rows[k] for k in numbers] for rows in (self._inverse, self._sums, self._lengths)
-        )
+        self._inverse, self._sums = ([rows[k] for k in numbers] for rows in (self._inverse, self._sums))
+        self._lengths = [self._lengths[k] for k in numbers]
 
     def between(self, first: int, second: int) -> Float[np.ndarray, "3 3"]:
         """Return the covariance of the motion between two nodes, in the frame of the later one."""

@@ -58,18 +58,24 @@ class PoseGraph:
         self._poses.append(pose)
         return len(self._poses) - 1
 
-    def add_motion(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
+    def add_motion(
+        self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]
+    ) -> None:
         """Add a relative pose by odometry, a known inlier."""
         self._motion_factors.append(_factor(of, to, relative, covariance))
         self._pending.add(self._motion_factors[-1])
 
-    def add_match(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
+    def add_match(
+        self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]
+    ) -> None:
         """Add a match with the submap being built, or a heading constraint from walls: accepted until the final
         optimisation."""
         self._match_factors.append(_factor(of, to, relative, covariance))
         self._pending.add(self._match_factors[-1])
 
-    def add_closure(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
+    def add_closure(
+        self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]
+    ) -> None:
         """Add a loop closure, which may be false; it has no effect until it is accepted."""
         self._closure_factors.append(_factor(of, to, relative, covariance))
         self.closures.append((of, to))
@@ -97,10 +103,8 @@ class PoseGraph:
             return np.array([all(key in place for key in factor.keys()) for factor in factors], bool)
 
         def chosen(factors: list, stay: np.ndarray) -> list:
-            moved = [factor for factor, each in zip(factors, stay, strict=True) if each]
-            return [
-                gtsam.BetweenFactorPose2(*(place[k] for k in f.keys()), f.measured(), f.noiseModel()) for f in moved
-            ]
+            moved = [(*factor.keys(), factor) for factor, each in zip(factors, stay, strict=True) if each]
+            return [gtsam.BetweenFactorPose2(place[a], place[b], f.measured(), f.noiseModel()) for a, b, f in moved]
 
         steps = {tuple(factor.keys()): factor for factor in self._motion_factors}
         self._motion_factors = [
@@ -114,7 +118,7 @@ class PoseGraph:
         self._closure_factors = chosen(self._closure_factors, closures)
         self._accepted_matches = self._accepted_matches[matches[: len(self._accepted_matches)]]
         self.accepted = self.accepted[closures]
-        self.closures = [tuple(factor.keys()) for factor in self._closure_factors]
+        self.closures = [(of, to) for of, to in (factor.keys() for factor in self._closure_factors)]
         poses, self._poses = self.poses[list(numbers)], Rows(3)
         for pose in poses:
             self._poses.append(pose)
@@ -172,7 +176,7 @@ class PoseGraph:
         for factor in self._motion_factors:
             of, to = factor.keys()
             motion = between(self.poses[of], self.poses[to])
-            found[to] = carried(found[of], motion) + factor.noiseModel().covariance()
+            found[to] = carried(found[of], motion) + _covariance(factor)
         return found
 
     def _accepted_factors(self) -> list:
@@ -183,8 +187,9 @@ class PoseGraph:
 
     def _downweighted(self, factor: gtsam.BetweenFactorPose2) -> gtsam.BetweenFactorPose2:
         """The factor of a match or a closure with its covariance multiplied by `correlated`."""
-        noise = gtsam.noiseModel.Gaussian.Covariance(self.correlated * factor.noiseModel().covariance())
-        return gtsam.BetweenFactorPose2(*factor.keys(), factor.measured(), noise)
+        noise = gtsam.noiseModel.Gaussian.Covariance(self.correlated * _covariance(factor))
+        of, to = factor.keys()
+        return gtsam.BetweenFactorPose2(of, to, factor.measured(), noise)
 
     def _reject_outliers(self) -> None:
         graph = self._graph([*self._match_factors, *self._closure_factors])
@@ -213,7 +218,15 @@ class PoseGraph:
         return values
 
 
-def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:
+def _covariance(factor: gtsam.BetweenFactorPose2) -> Float[np.ndarray, "3 3"]:
+    noise = factor.noiseModel()
+    assert isinstance(noise, gtsam.noiseModel.Gaussian)
+    return noise.covariance()
+
+
+def _factor(
+    of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]
+) -> gtsam.BetweenFactorPose2:
     noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
     return gtsam.BetweenFactorPose2(of, to, gtsam.Pose2(*relative), noise)
 

@@ -25,7 +25,8 @@ class MapRenderer:
         self._clear()
 
     def _clear(self) -> None:
-        self._grid, self._nodes = OccupancyGrid.empty(self.config.map_resolution), []
+        self._grid = OccupancyGrid.empty(self.config.map_resolution)
+        self._nodes: list[Node] = []
         self._poses, self._reach = np.zeros((0, 3)), 0.0  # length of the longest ray, m
 
     def render(self, nodes: Sequence[Node], poses: Float[np.ndarray, "node 3"]) -> OccupancyGrid:

@@ -19,7 +19,8 @@ _PLACE_SIZE, _PLACE_SECTOR = 1.0, np.pi / 2
 
 def redundant_submaps(submaps: Sequence[Submap], poses: Float[np.ndarray, "node 3"]) -> list[Submap]:
     """Return the submaps whose places are all covered by enough newer submaps that stay."""
-    seen, found = Counter(), []
+    seen: Counter[tuple[int, ...]] = Counter()
+    found = []
     for submap in reversed(submaps):
         places = {
             tuple(place)

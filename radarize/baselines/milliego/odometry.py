@@ -9,7 +9,7 @@ from radarize.baselines.milliego.panorama import panoramas
 from radarize.io.pose import compose
 from radarize.io.stopwatch import stage
 from radarize.learning.features.windows import spaced
-from radarize.odometry.displacements import as_track
+from radarize.odometry.displacements import Update, as_track
 from radarize.odometry.integration import Track, intervals
 from radarize.odometry.smoother import FixedLagSmoother
 from radarize.pipeline.method import Inputs, Method
@@ -57,7 +57,7 @@ class MilliEgoOdometry(InertialOdometry):
             ]
         return as_track(centers, track)
 
-    def _next(self, time: float, dt: float, motion: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _next(self, time: float, dt: float, motion: np.ndarray, covariance: np.ndarray) -> Update:
         back = self.path.add_frame(time)
         self._yaw.predict(dt)
         self._yaw.add_relative_motion(back, motion[2], self.path.reach * covariance[2, 2])

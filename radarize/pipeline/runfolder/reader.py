@@ -197,6 +197,10 @@ class RunFolder:
         write_whole(self.path / "metrics.json", json.dumps(metrics, indent=2) + "\n")
 
 
+def _declared(file: h5py.File, name: str) -> h5py.Dataset:
+    return dataset(file, name, Path(file.filename), _PACKED, _AHEAD)
+
+
 class Scans(Mapping[str, np.ndarray]):
     """Data sets of a run's ``scans.h5`` by path, each read on first access.
 
@@ -209,7 +213,8 @@ class Scans(Mapping[str, np.ndarray]):
     """
 
     def __init__(self, path: Path | None = None):
-        self.path, self._known = path, {}
+        self.path = path
+        self._known: dict[str, np.ndarray] = {}
         self._lengths: dict[str, int] = {}
         self._names: list[str] = []
         if path is None:
@@ -222,14 +227,14 @@ class Scans(Mapping[str, np.ndarray]):
                     raise InputError(f"{path}: has no /{name}, expected /time, /ranges and /azimuths")
             # The length of an axis is that of the first data set in the order above that has it.
             for name in [name for name in SHAPES if name in self._names]:
-                self._check(name, dataset(file, name, path, _PACKED, _AHEAD))
+                self._check(name, _declared(file, name))
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._known:
             if name not in self._names:
                 raise KeyError(name)
             with self._open() as file:
-                data = dataset(file, name, self.path, _PACKED, _AHEAD)
+                data = _declared(file, name)
                 rows = slice(self._lengths["scan"]) if SHAPES.get(name, "").startswith("scan") else ...
                 values = data[rows]
             if name in _AXES and not np.isfinite(values).all():
@@ -248,11 +253,12 @@ class Scans(Mapping[str, np.ndarray]):
         with self._open() as source:
             for name in self._names:
                 if name not in without:
-                    dataset(source, name, self.path, _PACKED, _AHEAD)
+                    _declared(source, name)
                     source.copy(name, file, name)
 
     @contextmanager
     def _open(self) -> Iterator[h5py.File]:
+        assert self.path is not None  # without a file there are no names
         with explained(f"{self.path}: is no readable HDF5 file"), open_hdf5(self.path) as file:
             yield file
 

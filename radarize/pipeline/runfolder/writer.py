@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -60,7 +61,7 @@ class RunWriter:
 
     def __init__(self, folder: str | Path, radar: RadarConfig | None = None):
         self.folder, self.health = Path(folder), None if radar is None else Health(radar)
-        self._facts: dict[str, object] = {}
+        self._facts: dict[str, Any] = {}
         self._files = Replacement(self.folder, FILES)
         try:
             with self._writing():
@@ -72,7 +73,7 @@ class RunWriter:
     def __enter__(self) -> "RunWriter":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         try:
             self._scans.close()
         except (OSError, RuntimeError):
@@ -85,6 +86,7 @@ class RunWriter:
         track = result.track
         if not len(track.time):
             return
+        assert self.health is not None
         self.health.add(result)
         self.extend("time", track.time, "s, burst middles")
         self.extend("frames", result.frames, "numbers, gaps counted")
@@ -117,6 +119,7 @@ class RunWriter:
         times, period, name = self._scans["time"], recording.config.frame_period, recording.path.name
         attributes = {k: v for k, v in recording.attributes.items() if isinstance(v, str | int | float)}
         centers = recording.times[[span.start, span.stop - 1]] + recording.config.burst_center
+        assert self.health is not None
         observability = self.health.observability
         observability.lost(float(centers[0]), float(times[0]))
         observability.lost(float(times[-1]), float(centers[1]))
@@ -219,6 +222,8 @@ class RunWriter:
 
     def inherit(self, scans: Scans, without: tuple[str, ...]) -> None:
         """Copy another run's data sets of ``scans.h5``, except for some."""
+        if scans.path is None:
+            return
         with self._writing(scans.path.stat().st_size):
             scans.copy(self._scans, without)
 

@@ -12,7 +12,7 @@ from radarize.io.plain import Frozen, setting
 from radarize.io.pose import compose, exponential
 from radarize.io.stopwatch import stage
 from radarize.odometry.doppler import Velocities
-from radarize.odometry.rotation import Rotations
+from radarize.odometry.rotation import RotationEstimator, Rotations
 from radarize.odometry.uncertainty import ErrorModel, half_turned
 from radarize.radar.config import RadarConfig
 from radarize.signal.batch import Batch
@@ -39,19 +39,6 @@ class VelocityEstimator(Protocol):
     lever: float
 
     def estimate(self, batch: Batch) -> Velocities: ...
-
-
-class RotationEstimator(Protocol):
-    """Estimator of the yaw increments from frame to frame, given the filtered velocities.
-
-    Attributes:
-        lag: standard deviation of the scale error of a yaw increment, as a share of it. An estimate that lags in a turn
-            lags in all of its frames, so these errors add up, to 6 deg in a turn of 90 deg.
-    """
-
-    lag: float
-
-    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations: ...
 
 
 @dataclass(frozen=True)

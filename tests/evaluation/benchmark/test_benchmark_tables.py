@@ -178,7 +178,8 @@ def test_size_and_training_of_networks():
     network = UsedNetwork.of(Weights(None).of("rotation"))
     assert (
         network.sentence.startswith("rotation, width 16, 70")
-        and "4.6 h of training, then any-radar, then training, then training (random-0), 18 epochs" in network.sentence
+        and "5.5 h of training, then any-radar, then training, then training, then any-radar, then any-radar (random-0)"
+        in network.sentence
     )
 
 

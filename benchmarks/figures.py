@@ -189,7 +189,7 @@ def frame_times() -> dict[str, float]:
 def simulator() -> str:
     """Time per frame of the simulator and of Sionna RT on one scene."""
     speed = frame_times()
-    ours, theirs = speed["office: radarsim"], speed["office: --engine sionna"] / 1e3
+    ours, theirs = speed["office: radarsim"], speed["office: paths of Sionna RT"] / 1e3
     return f"{ours:.0f} ms on one core; the paths of Sionna RT take {theirs:.1f} s"
 
 

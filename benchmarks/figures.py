@@ -141,7 +141,7 @@ def clock_gap() -> str:
 
 
 def live_time() -> str:
-    """Time per followed frame of `radarize live` with networks, and the time between frames."""
+    """Mean run time of `radarize live` with networks per frame received, and the time between frames."""
     row = next(row for row in rows("live_speed") if row["odometry, scans"] == "fused, segmentation")
     return f"{row['ms a frame']:.0f} ms of the {row['budget, ms']:.0f} ms between frames"
 

@@ -192,7 +192,7 @@ class BearingTracker:
         """Associate the wall of the k-th track with the remembered directions."""
         state, place = self._state, self._index(k)
         rows = [state.row({place: 1.0, self._first + wall: -1.0}) for wall in range(len(self._walls))]
-        off = -np.asarray(from_right_angle(np.array([row @ state.mean for row in rows])))
+        off = -from_right_angle(np.array([row @ state.mean for row in rows]))
         variances = np.array([state.variance(row) + _RIGHT_ANGLE_STD**2 for row in rows])
         direction = associate_direction(off, variances, self._walls)
         if direction is None:

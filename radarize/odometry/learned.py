@@ -38,8 +38,7 @@ class LearnedVelocity:
     def __init__(self, radar: RadarConfig, weights: Path):
         self._net, header = compiled(weights, TranslationNet, radar)
         self._windows = header.windows(radar, TranslationNet.maker)
-        assert header.grid is not None  # it has maps
-        self.limit = header.grid.reach / 2
+        self.limit = header.map_grid.reach / 2
 
     @torch.inference_mode()
     def estimate(self, batch: Batch, requested: Bool[np.ndarray, "frame"] | None = None) -> Velocities:

@@ -1,6 +1,7 @@
 """Directions of walls: most walls of a building are at right angles, or have a few directions."""
 
 from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 from jaxtyping import Float
@@ -9,6 +10,14 @@ from radarize.io.pose import wrap
 
 #: Weight of a new direction, in walls; minimum probability for a wall to be associated with a known direction.
 _NEW_WEIGHT, _MIN_PROBABILITY = 0.5, 0.9
+
+
+@overload
+def from_right_angle(angle: float) -> float: ...
+
+
+@overload
+def from_right_angle(angle: np.ndarray) -> np.ndarray: ...
 
 
 def from_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[np.ndarray, "*any"]:

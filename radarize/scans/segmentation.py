@@ -48,8 +48,7 @@ class SegmentationScans:
         self._net, header = compiled(weights, SegmentationNet, radar)
         self._windows, self.ranges = header.windows(radar, SegmentationNet.maker), header.ranges(radar)
         self.first = first
-        assert header.grid is not None  # the input of the network is maps
-        self._beyond = beyond if radar.max_range > header.grid.reach else None
+        self._beyond = beyond if radar.max_range > header.map_grid.reach else None
 
     @torch.inference_mode()
     def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:

@@ -81,7 +81,7 @@ class Walls:
         usable = [k for k, variance in enumerate(variances) if variance < _MAX_HEADING_STD**2]
         firsts = [next(iter(self._known[k].items())) for k in usable]
         expected = np.array([headings[first] + angle for first, angle in firsts])
-        deviations = np.asarray(from_right_angle(expected - headings[node] - found.angle))
+        deviations = from_right_angle(expected - headings[node] - found.angle)
         index = associate_direction(deviations, np.array(variances)[usable], [len(self._known[k]) for k in usable])
         if index is None:
             return None

@@ -57,8 +57,9 @@ class Header(Frozen):
     version: str = __version__
 
     @property
-    def _seen(self) -> MapGrid:
-        assert self.grid is not None  # only called for networks with maps
+    def map_grid(self) -> MapGrid:
+        """Grid of the maps of a network whose input is maps."""
+        assert self.grid is not None, f"{self.kind} has no maps"
         return self.grid
 
     def windows(self, config: RadarConfig, maker: type[Maker], spacings: Sequence[int] | None = None) -> Windows:
@@ -71,7 +72,7 @@ class Header(Frozen):
                 once.
         """
         chosen = self.spacings[:1] if spacings is None else spacings
-        grid = self._seen
+        grid = self.map_grid
         ratio = grid.frame_period / config.frame_period
         own, centred = MapGrid.of(config, self.maps[0], maker), maker.axes(config, self.maps[0]).centred
         return Windows(
@@ -81,11 +82,11 @@ class Header(Frozen):
 
     def ranges(self, config: RadarConfig) -> Float[np.ndarray, "row"]:
         """Return the ranges of the network's map rows for a radar, m."""
-        return self._seen.step * np.arange(self._seen.rows) - config.range_bias
+        return self.map_grid.step * np.arange(self.map_grid.rows) - config.range_bias
 
     def difference(self, config: RadarConfig, maker: type[Maker]) -> str | None:
         """Return in words why the network cannot process a radar's maps; None if it can."""
-        grid, own, period = self._seen, MapGrid.of(config, self.maps[0], maker), config.frame_period
+        grid, own, period = self.map_grid, MapGrid.of(config, self.maps[0], maker), config.frame_period
         if not maker.physical:
             share = grid.frame_period / period
             fits = round(share) >= 1 and abs(share - round(share)) < TOLERANCE * share

@@ -222,8 +222,7 @@ class RunWriter:
 
     def inherit(self, scans: Scans, without: tuple[str, ...]) -> None:
         """Copy another run's data sets of ``scans.h5``, except for some."""
-        if scans.path is None:
-            return
+        assert scans.path is not None
         with self._writing(scans.path.stat().st_size):
             scans.copy(self._scans, without)
 

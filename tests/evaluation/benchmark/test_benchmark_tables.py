@@ -166,8 +166,8 @@ def test_recordings_of_tuning_sets_are_listed():
     assert [task.seed for task in tasks] == [seed for seeds in SETS["EVALUATION"].values() for seed in seeds]
     walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in SETS["EVALUATION"].items() for seed in seeds]
     listed = tuned_on(walks)
-    assert len(listed) == 1 and listed[0].startswith("at most 6 of 15 in the tuning set of the measurement noise")
-    assert tuned_on(walks[:2])[0].startswith("at most 2 of 2")
+    assert len(listed) == 2 and listed[0].startswith("at most 4 of 15 in the tuning set of the probability")
+    assert tuned_on(walks[:2])[1].startswith("at most 2 of 2")
     others = [replace(walk, seed=1) for walk in walks]
     assert tuned_on(others) == ["none in a tuning set", "other walks through A_0, B_0, C_0, D_0, office are"]
     assert tuned_on([NamedWalk("elsewhere", 1, 1.0, True)]) == ["none in a tuning set"]

@@ -197,18 +197,27 @@ def scans() -> str:
     """Scans and maps by method, and at the worst level of the multipath test."""
     head = {"within 10 cm %": 1, "returned %": 1, "ghosts left %": 1, "map F1 %": 1, "SLAM ATE m": 3}
     worst = {"ghosts, % of returns": 1, "map F1, %": 1, "SLAM ATE, m": 3}
-    severe = {row["scans"]: row for row in rows("multipath") if row["levels"] == "most severe"}
+    plain, severe = (
+        {row["scans"]: row for row in rows(part) if row[column] == level}
+        for part, column, level in (("mapping", "on", "all"), ("multipath", "levels", "most severe"))
+    )
     lines = [
         [
-            str(row["scans"]),
-            *(f"{row[name]:.{digits}f}" for name, digits in head.items()),
-            *(f"{severe[row['scans']][name]:.{digits}f}" for name, digits in worst.items()),
+            extractor,
+            *(f"{plain[extractor][name]:.{digits}f}" for name, digits in head.items()),
+            *(f"{severe[extractor][name]:.{digits}f}" for name, digits in worst.items()),
         ]
-        for row in rows("mapping")
-        if row["on"] == "all" and row["scans"] in EXTRACTORS
+        for extractor in EXTRACTORS
     ]
     names = [f"{name[:-2]}, {name[-1]}" if name[-2] == " " else name for name in head]
     return table(["scans by", *names, *(f"worst level: {name}" for name in worst)], lines)
+
+
+def ranges() -> str:
+    """Accuracy and share of the ranges that the network returns."""
+    found = _default_scans("mapping")
+    near, returned = (f"{found[f'{name} %']:.0f} %" for name in ("within 10 cm", "returned"))
+    return f"{near} of ranges are within 10 cm, and {returned} of surfaces have a range"
 
 
 def conditions() -> str:
@@ -293,7 +302,7 @@ FIGURES: dict[str, Callable[[], str]] = {
     "long-walks-mean": long_walks_mean, "scans": scans, "conditions": conditions, "radars": radars, "real": real,
     "realism": realism, "back-end": back_end, "clock-gap": clock_gap, "live-time": live_time,
     "live-dropped": live_dropped, "headlines": headlines, "sizes": sizes, "heatmap-share": heatmap_share,
-    "simulator": simulator,
+    "simulator": simulator, "ranges": ranges,
 }  # fmt: skip
 
 

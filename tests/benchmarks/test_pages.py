@@ -17,8 +17,6 @@ from radarsim.dataset.specification import Specification
 
 PLACE = make.Place(PARTS, Path(), Path(), False, None, None)
 LISTED = {name: about for page in make.PAGES.values() for name, about in page["parts"].items()}
-#: Parts that were made by scripts of release 1.0, with commands of that release.
-FORMER = {"long_walks"}
 
 
 def understood(command: str) -> None:
@@ -56,7 +54,7 @@ def test_a_part_has_a_command(name):
     """The command of the existing part, and the present ones, in full and as a short trial."""
     about = LISTED[name]
     path = PARTS / f"{name}.json"
-    if path.is_file() and name not in FORMER:
+    if path.is_file():
         understood(Results.read(path).command)
     for words in (about.get("words", ""), f"{about.get('words', '')} {about.get('smoke', '')}"):
         if "benchmark" in about:

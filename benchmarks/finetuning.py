@@ -186,6 +186,10 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
+def _path(folder: Path, shown: int, how: str) -> Path:
+    return folder / f"{how}-{shown}.safetensors"
+
+
 @script(
     "Fine-tuning on real walks",
     data=CLONE,
@@ -219,7 +223,3 @@ def main(options: argparse.Namespace) -> Page:
             "above which every cell has a point was chosen on the training walks.",
         ],
     )
-
-
-def _path(folder: Path, shown: int, how: str) -> Path:
-    return folder / f"{how}-{shown}.safetensors"

@@ -1,5 +1,6 @@
 """Pages of results: their commands exist, and figures in docs agree with them."""
 
+import ast
 import importlib
 import shlex
 from pathlib import Path
@@ -77,6 +78,15 @@ def test_a_data_set_of_a_part_is_valid(name, tmp_path):
             (tmp_path / config.name).write_text(config.read_text())
         (tmp_path / path.name).write_text(text)
         assert Specification.load(tmp_path / path.name).recordings
+
+
+def test_main_of_a_script_is_the_end_of_its_file():
+    """It runs where it is decorated, and does not know what stands below."""
+    scripts = [path for path in make.HERE.glob("*.py") if "\n@script(" in path.read_text()]
+    assert len(scripts) > 10
+    for path in scripts:
+        *_, last = ast.parse(path.read_text()).body
+        assert isinstance(last, ast.FunctionDef) and last.decorator_list, path
 
 
 def test_figures_of_the_docs_are_those_of_the_pages():

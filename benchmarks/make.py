@@ -78,7 +78,7 @@ class Part:
         """
         if self.about.get("needs") == "radarhd" and not place.radarhd.is_dir():
             return f"Left out: {self.name}, because there is no clone of RadarHD's repository (--radarhd)."
-        data = [recordings(name, place) for name in self._sets()]
+        data = [recordings(name, place) for name in self.sets()]
         benchmark, words = self.about.get("benchmark"), self._words(place)
         if benchmark is None:
             command = [sys.executable, "-m", f"benchmarks.{self.name}", *words, "--out", str(place.parts)]
@@ -102,7 +102,7 @@ class Part:
         path = place.parts / f"{self.name}.json"
         return Results.read(path) if path.is_file() else None
 
-    def _sets(self) -> list[str]:
+    def sets(self) -> list[str]:
         """Return the data sets that the part reads; for a folder, all of its specifications."""
         name = self.about.get("data") or self.about.get("simulated")
         if name is None or not name.endswith("/"):
@@ -143,16 +143,21 @@ def common(folders: list[Path]) -> Path:
     return folders[0] if len(folders) == 1 else folders[0].parent
 
 
+def data_file(name: str) -> Path:
+    """Return the file of a data set, in this folder or in scenes/datasets."""
+    return next(path for folder in (HERE, ROOT / "scenes" / "datasets") if (path := folder / f"{name}.yaml").is_file())
+
+
 def recordings(name: str, place: Place) -> Path:
     """Make the missing recordings of a data set, or a few short ones for a short trial; return their folder."""
     folder, plans = place.work / "data" / name, place.work / "plans"
     plans.mkdir(parents=True, exist_ok=True)
-    source = next(beside for beside in (HERE, ROOT / "scenes" / "datasets") if (beside / f"{name}.yaml").is_file())
-    text = (source / f"{name}.yaml").read_text()
+    source = data_file(name)
+    text = source.read_text()
     for plan, log in PLANS.items():
         if f"{plan}.yaml" in text and not (plans / f"{plan}.yaml").is_file():
             import_scene(log, plans)
-    for beside in source.glob("*.cfg"):
+    for beside in source.parent.glob("*.cfg"):
         shutil.copy(beside, plans)
     path = write_whole(plans / f"{name.replace('/', '-')}.yaml", shortened(text) if place.smoke else text)
     with progress(f"recordings of {name}") as report:

@@ -18,6 +18,7 @@ from radarsim.dataset.specification import Specification
 
 PLACE = make.Place(PARTS, Path(), Path(), False, None, None)
 LISTED = {name: about for page in make.PAGES.values() for name, about in page["parts"].items()}
+DATA = {data for part, about in LISTED.items() for data in make.Part(part, about).sets()}
 
 
 def understood(command: str) -> None:
@@ -64,20 +65,17 @@ def test_a_part_has_a_command(name):
             understood(f"python -m benchmarks.{name} {words}")
 
 
-@pytest.mark.parametrize("name", sorted({about["data"] for about in LISTED.values() if "data" in about}))
+@pytest.mark.parametrize("name", sorted(DATA))
 def test_a_data_set_of_a_part_is_valid(name, tmp_path):
     """Except for the buildings that are made from lidar logs."""
-    pattern = f"{name}*.yaml" if name.endswith("/") else f"{name}.yaml"
-    found = [path for folder in (make.HERE, make.ROOT / "scenes" / "datasets") for path in folder.glob(pattern)]
-    assert found
-    for path in found:
-        text = path.read_text()
-        for plan in make.PLANS:
-            text = text.replace(f"{plan}: {plan}.yaml", f"{plan}: {{kind: A, seed: 1}}")
-        for config in path.parent.glob("*.cfg"):
-            (tmp_path / config.name).write_text(config.read_text())
-        (tmp_path / path.name).write_text(text)
-        assert Specification.load(tmp_path / path.name).recordings
+    path = make.data_file(name)
+    text = path.read_text()
+    for plan in make.PLANS:
+        text = text.replace(f"{plan}: {plan}.yaml", f"{plan}: {{kind: A, seed: 1}}")
+    for config in path.parent.glob("*.cfg"):
+        (tmp_path / config.name).write_text(config.read_text())
+    (tmp_path / path.name).write_text(text)
+    assert Specification.load(tmp_path / path.name).recordings
 
 
 def test_main_of_a_script_is_the_end_of_its_file():
